@@ -96,19 +96,19 @@ def poll() -> bool:
     _watch.listed = frozenset(map(captures.root, captures.listed()))
     if _watch.root is None and _watch.found is not None:
         choose(_watch.found)
-    known = view()
+    batch_view = view()
     for root in list(_accepted):
-        face = known.face(root)
-        if face is None or face.name in known.states and known.states[face.name].state != WAITING:
+        face = batch_view.face(root)
+        if face is None or face.name in batch_view.states and batch_view.states[face.name].state != WAITING:
             _accepted.discard(root)
     before = _shown
     _shown = (
         current(),
-        known.states,
-        known.runner,
-        bool(known.problem),
-        line(known),
-        share(known),
+        batch_view.states,
+        batch_view.runner,
+        bool(batch_view.problem),
+        line(batch_view),
+        share(batch_view),
         frozenset(_accepted),
     )
     return before != _shown

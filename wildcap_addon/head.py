@@ -93,9 +93,9 @@ def _take_shape(kept_mesh: bpy.types.Mesh, new_mesh: bpy.types.Mesh) -> bool:
         return False
     places = data_blocks.read_field(new_mesh.vertices, "co", 3)
     keys = kept_mesh.shape_keys.key_blocks if kept_mesh.shape_keys else ()
-    moved = places - data_blocks.read_field(keys[0].data if keys else kept_mesh.vertices, "co", 3)
+    displacements = places - data_blocks.read_field(keys[0].data if keys else kept_mesh.vertices, "co", 3)
     for key in keys:
-        key.data.foreach_set("co", (data_blocks.read_field(key.data, "co", 3) + moved).ravel())
+        key.data.foreach_set("co", (data_blocks.read_field(key.data, "co", 3) + displacements).ravel())
     kept_mesh.vertices.foreach_set("co", places.ravel())
     kept_mesh.update()
     return True
@@ -146,11 +146,11 @@ def load_image(path, data: bool = False) -> bpy.types.Image:
     """
     path = Path(path)
     images = [image for image in bpy.data.images if image.source == 'FILE' and image.filepath]
-    known = [i for i in images if Path(bpy.path.abspath(i.filepath, library=i.library)) == path]
-    touched = [i for i in known if i.is_dirty or i.packed_file is not None and not _is_packed(i, path)]
-    for image in touched:
+    of_file = [i for i in images if Path(bpy.path.abspath(i.filepath, library=i.library)) == path]
+    altered = [i for i in of_file if i.is_dirty or i.packed_file is not None and not _is_packed(i, path)]
+    for image in altered:
         image.use_fake_user = True
-    image = next((i for i in known if i not in touched and i.library is None), None)
+    image = next((i for i in of_file if i not in altered and i.library is None), None)
     if image is None:
         image = bpy.data.images.load(str(path))
     if image.packed_file is None:

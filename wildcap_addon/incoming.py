@@ -49,7 +49,7 @@ def bring_in(ended: dict[str, str]) -> None:
             return
         for results in on_results:
             results.take(bpy.context, item)
-        made = ended.get(captures.root(item)) in HEAD_GOALS
-        if made and captures.head(bpy.context, item) is None and captures.folder(item).head.is_file():
+        needs_head = ended.get(captures.root(item)) in HEAD_GOALS
+        if needs_head and captures.head(bpy.context, item) is None and captures.folder(item).head.is_file():
             with contextlib.suppress(RuntimeError):  # the operator has shown the problem in the tab
                 bpy.ops.wildcap.bring_in_head('EXEC_DEFAULT', True)

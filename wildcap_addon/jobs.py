@@ -236,7 +236,7 @@ def _note_stage(job: Job, message: messages.StageDone) -> None:
 
 
 def _tick() -> float | None:
-    before, shown = dict(_jobs), _shown()
+    before, display = dict(_jobs), _shown()
     try:
         poll()
         ended = {root: job.goal for root, job in before.items() if root not in _jobs}
@@ -244,7 +244,7 @@ def _tick() -> float | None:
             incoming.bring_in(ended)
     except Exception as error:  # Blender would drop the timer, and the tab would stand still
         problems.show_error("", error, "listening to the solver")
-    if shown != _shown():  # a redraw takes time from the worker, and from an artist who paints
+    if display != _shown():  # a redraw takes time from the worker, and from an artist who paints
         status.redraw()
     return INTERVAL_S if _jobs or incoming.waits() else None
 

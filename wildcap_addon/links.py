@@ -28,9 +28,9 @@ def move(item, path: Path) -> None:
             thing[captures.HEAD_KEY] = str(path)
     for image in bpy.data.images:
         file = image.filepath if image.source == 'FILE' and not image.packed_file else ""
-        moved = _moved(file, before, path)
-        if moved and Path(moved).is_file():
-            image.filepath = bpy.path.relpath(moved) if file.startswith("//") and bpy.data.filepath else moved
+        new_path = _moved(file, before, path)
+        if new_path and Path(new_path).is_file():
+            image.filepath = bpy.path.relpath(new_path) if file.startswith("//") and bpy.data.filepath else new_path
     for stage, kind in STAGE_KINDS.items():
         settings = getattr(item, stage)
         for name in (field.name for field in fields(kind) if "path" in field.metadata):

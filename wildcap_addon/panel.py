@@ -48,8 +48,9 @@ class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
             layout.operator("wildcap.use_python", icon='FILE_FOLDER')
         if item is None:
             layout.operator("wildcap.open_sample_head", icon='USER')
-        known = status.of(item) if item is not None else None
-        problems.draw(layout, problems.of(root) or problems.of("") or (known.problem if known else None), width)
+        capture_status = status.of(item) if item is not None else None
+        status_problem = capture_status.problem if capture_status else None
+        problems.draw(layout, problems.of(root) or problems.of("") or status_problem, width)
         for folder, other in jobs.elsewhere(root):
             box = layout.box()
             box.label(text=Path(folder).stem, icon='USER')
@@ -63,15 +64,16 @@ class WILDCAP_PT_stages(CapturePanel, bpy.types.Panel):
 
     def draw(self, context):
         item = captures.active(context)
-        known, job = status.of(item), jobs.of(captures.root(item))
+        capture_status, job = status.of(item), jobs.of(captures.root(item))
         column = self.layout.column(align=True)
-        ready = known is not None and bool(known.source or known.has_head)  # for the first stage that is to do
+        # whether the first stage that is to do gets a button
+        ready = bool(capture_status and (capture_status.source or capture_status.has_head))
         for stage in stages.STAGES:
-            state = "running" if job and job.stage == stage.name else _state(known, stage.name)
+            state = "running" if job and job.stage == stage.name else _state(capture_status, stage.name)
             split = column.split(factor=0.47)
             split.label(text=stage.label, icon=STATE_ICONS[state])
             row = split.row()
-            row.label(text=_words(state, known, stage.name))
+            row.label(text=_words(state, capture_status, stage.name))
             if state == "running" and job.progress and job.progress.of > 0:
                 row.label(text=f"{_share(job.progress):.0%}")
             if job is None and (state in ("done", "stale", "older") or state == "to do" and ready):
@@ -92,8 +94,8 @@ class WILDCAP_PT_doctor(FoldedPanel, bpy.types.Panel):
     @classmethod
     def poll(cls, context):
         item = captures.active(context)
-        known = status.of(item) if item is not None else None
-        return known is not None and bool(known.findings)
+        capture_status = status.of(item) if item is not None else None
+        return capture_status is not None and bool(capture_status.findings)
 
     def draw_header(self, context):
         self.layout.label(text="", icon='ERROR')
@@ -147,17 +149,17 @@ def _share(progress) -> float:
     return min(1.0, progress.done / progress.of)
 
 
-def _state(known: status.Status | None, stage: str) -> str:
-    state = known.stages.get(stage, "to do") if known else "to do"
+def _state(capture_status: status.Status | None, stage: str) -> str:
+    state = capture_status.stages.get(stage, "to do") if capture_status else "to do"
     # the sample head comes without what it was made from
-    is_sample = known and known.has_head and not known.source
+    is_sample = capture_status and capture_status.has_head and not capture_status.source
     return "not needed" if state == "to do" and is_sample and stage in next_step.BEFORE_MASK else state
 
 
-def _words(state: str, known: status.Status | None, stage: str) -> str:
+def _words(state: str, capture_status: status.Status | None, stage: str) -> str:
     if state == "older":
-        return iface_("made by {}").format(known.versions[stage])
-    seconds = known.seconds.get(stage) if known else None
+        return iface_("made by {}").format(capture_status.versions[stage])
+    seconds = capture_status.seconds.get(stage) if capture_status else None
     if state in ("done", "stale") and seconds is not None:
         time = f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
         return (iface_("done, {}") if state == "done" else iface_("out of date, {}")).format(time)

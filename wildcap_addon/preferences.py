@@ -201,8 +201,8 @@ def set_python(path: Path | None, device: str = "", reason: str = "") -> None:
 
 def environment_folder() -> Path:
     """Return the folder of Install Solver's environment, outside the extension's own files, which updates replace."""
-    chosen = get().environment
-    return Path(bpy.path.abspath(chosen)) if chosen else environment.default_folder()
+    path = get().environment
+    return Path(bpy.path.abspath(path)) if path else environment.default_folder()
 
 
 def wheels_folder() -> Path | None:
@@ -225,8 +225,8 @@ def captures_folder(saved: bool = True) -> Path:
     """Return the .blend's folder; while it is unsaved (or with saved=False), the preferences' folder or the default."""
     if bpy.data.filepath and saved:
         return Path(bpy.data.filepath).parent
-    chosen = get().captures
-    return Path(bpy.path.abspath(chosen)) if chosen else captures_default()
+    path = get().captures
+    return Path(bpy.path.abspath(path)) if path else captures_default()
 
 
 def captures_default() -> Path:

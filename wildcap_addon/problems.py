@@ -22,9 +22,9 @@ def show(root: str, problem: Problem) -> None:
     _problems[root] = problem
 
 
-def show_error(root: str, error: Exception, stopped: str) -> None:
+def show_error(root: str, error: Exception, activity: str) -> None:
     """Show any error: a Problem as it is, others as an error inside WildCap that stopped something."""
-    show(root, error if isinstance(error, Problem) else unforeseen.explain(error, stopped))
+    show(root, error if isinstance(error, Problem) else unforeseen.explain(error, activity))
 
 
 def clear(root: str) -> None:

@@ -253,22 +253,22 @@ def job_settings(item: WILDCAP_PG_capture) -> dict:
     return {**stage_settings, "seed": item.seed, "device": device(item)}
 
 
-def take(item: WILDCAP_PG_capture, quality: str, chosen: core_settings.Settings) -> None:
+def take(item: WILDCAP_PG_capture, quality: str, new_settings: core_settings.Settings) -> None:
     """Set the fields to a job's quality and settings."""
     item.quality = quality
     for stage, kind in STAGE_KINDS.items():
         for f in fields(kind):
-            setattr(getattr(item, stage), f.name, getattr(getattr(chosen, stage), f.name))
-    tone = _parsed_tone(chosen.solve.skin_tone)
+            setattr(getattr(item, stage), f.name, getattr(getattr(new_settings, stage), f.name))
+    tone = _parsed_tone(new_settings.solve.skin_tone)
     item.use_skin_tone = tone is not None
     item.skin_tone = tone or item.skin_tone
-    item.seed, item.device = chosen.seed, chosen.device
+    item.seed, item.device = new_settings.seed, new_settings.device
 
 
 def _tone(item: WILDCAP_PG_capture) -> str:
     """Return the skin tone as text; unchanged, it is the very text that `take` got, so that nothing becomes stale."""
-    recorded, chosen = _parsed_tone(item.solve.skin_tone), format_skin_tone(item.skin_tone)
-    return item.solve.skin_tone if recorded is not None and format_skin_tone(recorded) == chosen else chosen
+    recorded, current = _parsed_tone(item.solve.skin_tone), format_skin_tone(item.skin_tone)
+    return item.solve.skin_tone if recorded is not None and format_skin_tone(recorded) == current else current
 
 
 def _parsed_tone(text: str) -> tuple[float, float, float] | None:

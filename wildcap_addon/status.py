@@ -84,13 +84,13 @@ def look(capture: Capture, settings) -> Status:
     try:
         record = capture.read()
         verdicts = {stage.name: _verdict(capture, stage, record, settings) for stage in stages.STAGES}
-        worn = newest_maps.find_newest_maps(capture)
+        maps = newest_maps.find_newest_maps(capture)
     except Problem as problem:
         return Status(problem=problem)
     except OSError as error:
         remedy = "Check the disk, or open the capture from its new place."
         return Status(problem=_unreadable(capture, error.strerror or error, remedy))
-    maps_time = max(map(_time, worn))
+    maps_time = max(map(_time, maps))
     render = max(capture.renders.glob("[!.]*.png"), key=_time, default=Path())
     solve = verdicts["solve"].state
     return Status(
@@ -102,13 +102,13 @@ def look(capture: Capture, settings) -> Status:
             if solve in freshness.FINISHED
             else mask_edit.obstacle(capture, settings)
         ),
-        seconds={name: done["seconds"] for name, done in record["stages"].items()},
+        seconds={name: entry["seconds"] for name, entry in record["stages"].items()},
         has_head=capture.head.is_file(),
         head_time=_time(capture.head),
         has_mask=capture.shadow_mask.is_file(),
         findings=tuple(report.findings(record)),
         interrupted=_interrupted(capture),
-        has_maps=all(path.is_file() for path in worn),
+        has_maps=all(path.is_file() for path in maps),
         maps_time=maps_time,
         render=render.name if _time(render) >= maps_time else "",
         **_sending(capture, settings),
@@ -123,9 +123,9 @@ def _verdict(capture: Capture, stage: stages.Stage, record: dict, settings) -> f
     if stage.name in record["stages"]:
         return capture.verdict(stage, settings)
     # a stage that began and did not end leaves outputs of another run, or incomplete ones
-    begun = (capture.logs / f"{stage.name}.log").is_file()
+    has_begun = (capture.logs / f"{stage.name}.log").is_file()
     complete = all(capture.has(name) for name in stage.writes)
-    return freshness.Verdict("absent" if complete and not begun else freshness.TO_DO)
+    return freshness.Verdict("absent" if complete and not has_begun else freshness.TO_DO)
 
 
 def _sending(capture: Capture, settings) -> dict:

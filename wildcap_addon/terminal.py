@@ -45,13 +45,13 @@ def execute(words: list[str]) -> int:
     """Run a subcommand, print its files or its problem, and return the exit code."""
     options = parser().parse_args(words)
     try:
-        made = options.carry_out(options)
+        result = options.carry_out(options)
     except Problem as problem:
         print(f"{problem.problem} {problem.remedy}", file=sys.stderr)
         return 1
-    if isinstance(made, int):
-        return made
-    print(*made, sep="\n")
+    if isinstance(result, int):
+        return result
+    print(*result, sep="\n")
     return 0
 
 

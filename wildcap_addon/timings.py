@@ -77,9 +77,9 @@ def _save() -> None:
 def register():
     unregister()
     with contextlib.suppress(OSError, ValueError, TypeError, AttributeError):  # no file yet, or a foreign one
-        kept = json.loads(_file().read_text(encoding="utf-8"))
-        _stages.update({str(name): float(seconds) for name, seconds in kept.pop(STAGES, {}).items()})
-        _rates.update({str(device): float(rate) for device, rate in kept.items()})
+        content = json.loads(_file().read_text(encoding="utf-8"))
+        _stages.update({str(name): float(seconds) for name, seconds in content.pop(STAGES, {}).items()})
+        _rates.update({str(device): float(rate) for device, rate in content.items()})
 
 
 def unregister():

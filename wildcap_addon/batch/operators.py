@@ -190,9 +190,9 @@ class WILDCAP_OT_accept_mask(MaskWalk, bpy.types.Operator):
         root = captures.root(captures.require(context))
         walking.leave(root)
         batches.accept(batches.view().face(root))
-        following = walking.following(root)
-        if following is not None:
-            walking.go(context, following)
+        next_face = walking.following(root)
+        if next_face is not None:
+            walking.go(context, next_face)
         else:
             self.report({'INFO'}, rpt_("All masks have been looked at: click Solve All"))
 

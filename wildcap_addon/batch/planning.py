@@ -22,18 +22,18 @@ def prepare(context) -> tuple[Batch, list[str]]:
     It is the open batch if that was planned from a table. Otherwise it has the scene's list, and replaces the record of
     the open batch if that has the same captures. Raises Problem if no capture has a video.
     """
-    opened = read_batch(batches.current()) if batches.current() is not None else None
+    open_batch = read_batch(batches.current()) if batches.current() is not None else None
     # captures in the batch's own folder: it was planned from a table, which decides on faces and settings
-    if opened is not None and any(face.root.parent == opened.root for face in opened.faces):
-        return opened, []
+    if open_batch is not None and any(face.root.parent == open_batch.root for face in open_batch.faces):
+        return open_batch, []
     faces, left_out = _list_faces(context)
     if not faces:
         raise Problem(
             "No capture of the list has a video or photographs that it could be made from.",
             "Choose videos: each becomes a capture of the list.",
         )
-    same = opened is not None and {face.root for face in opened.faces} == {face.root for face in faces}
-    root = opened.root if same else _make_folder(preferences.captures_folder() / FOLDER)
+    same = open_batch is not None and {face.root for face in open_batch.faces} == {face.root for face in faces}
+    root = open_batch.root if same else _make_folder(preferences.captures_folder() / FOLDER)
     batch = Batch(root, tuple(faces), gate=GATES[1])
     write_batch(batch)
     batches.choose(batch.root)

@@ -135,15 +135,15 @@ def _tick() -> float:
     global _worked
     try:
         poll()
-        changed = batches.poll()
+        has_news = batches.poll()
         root = captures.root(captures.active(bpy.context))
         before, _worked = _worked, root if batches.works_on(root) else ""
         if before and before == root != _worked:
             incoming.bring_in({root: "reconstruct"})
     except Exception as error:  # Blender would drop the timer, and the tab would stand still
         problems.show_error("", error, "listening to the batch")
-        changed = True
-    if changed:
+        has_news = True
+    if has_news:
         status.redraw()
     return INTERVAL_S
 

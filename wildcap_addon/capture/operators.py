@@ -54,16 +54,16 @@ class WILDCAP_OT_locate_capture(FileOperator, CaptureOperator, bpy.types.Operato
             raise Problem(
                 f"{name} is where it was.", "To work on another copy of it, click Locate Capture and choose its folder."
             )
-        chosen = Path(bpy.path.abspath(self.directory)).absolute() if self.directory else links.find(item)
-        if chosen is None:
+        folder = Path(bpy.path.abspath(self.directory)).absolute() if self.directory else links.find(item)
+        if folder is None:
             raise Problem(
                 f"{name} is neither beside this .blend nor among your captures.",
                 "Click Locate Capture and choose the folder it is in now.",
             )
-        place = next((path for path in (chosen, chosen / name) if links.is_capture(path)), None)
+        place = next((path for path in (folder, folder / name) if links.is_capture(path)), None)
         if place is None:
             raise Problem(
-                f"{chosen} is not a capture folder, and contains no {name}.",
+                f"{folder} is not a capture folder, and contains no {name}.",
                 "Choose the folder that ends in .wildcap, or its parent folder.",
             )
         Capture(place).read()  # refuses a damaged or newer one

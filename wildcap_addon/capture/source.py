@@ -57,8 +57,8 @@ class WILDCAP_OT_choose_video(FileOperator, bpy.types.Operator):
 
     def work(self, context):
         folder = Path(bpy.path.abspath(self.directory))
-        chosen = [folder / file.name for file in self.files if file.name] if self.directory else []
-        for source in sources(chosen or [Path(bpy.path.abspath(self.filepath or self.directory))]):
+        paths = [folder / file.name for file in self.files if file.name] if self.directory else []
+        for source in sources(paths or [Path(bpy.path.abspath(self.filepath or self.directory))]):
             capture = Capture(new_folder(preferences.captures_folder(), source))
             capture.set_source(source)
             captures.add(context, capture.root)
@@ -85,10 +85,10 @@ class WILDCAP_FH_source(bpy.types.FileHandler):
         )
 
 
-def sources(chosen: list[Path]) -> list[Path]:
+def sources(files: list[Path]) -> list[Path]:
     """Return the sources among chosen files: each video, and the folders of photographs. Raises Problem for others."""
     paths = []
-    for path in chosen:
+    for path in files:
         if not path.exists() or path == Path():
             raise Problem(f"There is no file or folder {path}.", "Choose a video, or a folder of photographs.")
         if path.is_file() and path.suffix.lower() in PHOTOGRAPHS:

@@ -68,10 +68,10 @@ def _read(capture: Capture) -> Strip | None:
     if not frames:
         return None
     sharpness = [frame.sharpness for frame in frames]
-    used = [i for i, frame in enumerate(frames) if frame.selected]
+    selected_indices = [i for i, frame in enumerate(frames) if frame.selected]
     limit = BLURRED_SHARE * sorted(sharpness)[len(sharpness) // 2]
-    choice = used or list(range(len(frames)))
-    shown = [choice[i * len(choice) // min(MOST_FRAMES, len(choice))] for i in range(min(MOST_FRAMES, len(choice)))]
+    choice = selected_indices or list(range(len(frames)))
+    indices = [choice[i * len(choice) // min(MOST_FRAMES, len(choice))] for i in range(min(MOST_FRAMES, len(choice)))]
     sharpest = max(sharpness) or 1.0
     strip = tuple(
         Frame(
@@ -80,9 +80,9 @@ def _read(capture: Capture) -> Strip | None:
             sharpness[i] < limit,
             frame_icons.load(capture.frames / frames[i].name),
         )
-        for i in shown
+        for i in indices
     )
-    return Strip(strip, len(frames), len(used), sum(value < limit for value in sharpness))
+    return Strip(strip, len(frames), len(selected_indices), sum(value < limit for value in sharpness))
 
 
 def _tick() -> float:

@@ -28,8 +28,8 @@ def store_painting(mask: np.ndarray, capture: Capture, mask_kind: str, stamp: tu
     """
     path = mask_image.file_of(capture, mask_kind)
     try:
-        written = mask_image.store_mask(mask, capture, mask_kind, keep=_stamp(path) != tuple(stamp))
-        return _stamp(path) if written else stamp
+        was_written = mask_image.store_mask(mask, capture, mask_kind, keep=_stamp(path) != tuple(stamp))
+        return _stamp(path) if was_written else stamp
     except OSError as error:  # a file server may be briefly unavailable: the next look tries again
         raise storage_problem(error, path) from error
 

@@ -29,15 +29,15 @@ def load(capture: Capture, mask_kind: str = 'SHADOW') -> bpy.types.Image:
 
     A new shadow mask starts from the proposal, a new protect mask empty.
     """
-    kept = file_of(capture, mask_kind)
-    path = kept if kept.is_file() else capture.shadow_mask_auto
+    own_file = file_of(capture, mask_kind)
+    path = own_file if own_file.is_file() else capture.shadow_mask_auto
     if not path.is_file():
         raise Problem("This capture has no shadow mask yet.", "Click Reconstruct first.")
     name = f"{capture.root.stem} {mask_kind.capitalize()} Mask"
     image = bpy.data.images.get(name)
     if image is not None:
         settle(image, capture, mask_kind)
-        path = kept if kept.is_file() else path
+        path = own_file if own_file.is_file() else path
         bpy.data.images.remove(image)
     image = bpy.data.images.load(str(path))
     image.name = name
@@ -49,8 +49,8 @@ def load(capture: Capture, mask_kind: str = 'SHADOW') -> bpy.types.Image:
             "Restore it from mask_history, or delete it to start from the proposal.",
         )
     # The proposal is never overwritten: if Blender saves the image itself, it writes to the artist's mask.
-    image.filepath_raw = str(kept)
-    if mask_kind == 'PROTECT' and not kept.is_file():
+    image.filepath_raw = str(own_file)
+    if mask_kind == 'PROTECT' and not own_file.is_file():
         set_values(image, np.zeros_like(mask_values(image)))
     return image
 
@@ -60,14 +60,14 @@ def settle(image: bpy.types.Image, capture: Capture, mask_kind: str) -> None:
     path = file_of(capture, mask_kind)
     if image.packed_file is None or not bpy.data.filepath or not image.size[0]:
         return
-    packed = grey_png(mask_values(image))
-    if path.is_file() and path.read_bytes() == packed:
+    packed_png = grey_png(mask_values(image))
+    if path.is_file() and path.read_bytes() == packed_png:
         return
     if not path.is_file() or Path(bpy.data.filepath).stat().st_mtime > path.stat().st_mtime:
         mask_history.keep(capture, path)
-        write(path, packed)
+        write(path, packed_png)
     else:
-        mask_history.keep(capture, path, packed)
+        mask_history.keep(capture, path, packed_png)
 
 
 def refresh(image: bpy.types.Image, capture: Capture, mask_kind: str) -> None:

@@ -104,11 +104,11 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
         image = session.mask()
         mask = mask_image.mask_values(image)
         files = {"PROPOSAL": capture.shadow_mask_auto, "SNAPPED": capture.shadow_mask_edges}
-        changed = mask_image.proposal(image, files[self.kind]) if self.kind in files else EDITS[self.kind](mask)
+        new_mask = mask_image.proposal(image, files[self.kind]) if self.kind in files else EDITS[self.kind](mask)
         # the state that Ctrl-Z restores: Blender 5 stores the one before a step, not the one after it
         if not image.is_dirty or bpy.app.version >= (5, 0, 0):
             session.push_undo(context)
-        mask_image.set_values(image, changed)
+        mask_image.set_values(image, new_mask)
         session.push_undo(context)
         if self.kind == session.offered():
             session.offer("")

@@ -42,13 +42,13 @@ def opacity(before: list[dict]) -> float | None:
 
 def restore(before: list[dict]) -> None:
     """Restore shading and overlays of the views that still exist, but not the viewpoints."""
-    for space, kept in _spaces(before):
-        shading = kept["shading"]
+    for space, state in _spaces(before):
+        shading = state["shading"]
         space.shading.type = 'SOLID'  # light and colour of Solid shading can only be set in it
         space.shading.light, space.shading.color_type = shading["light"], shading["color_type"]
         space.shading.type = shading["type"]
-        space.overlay.show_overlays = kept["overlays"]
-        space.overlay.texture_paint_mode_opacity = kept["opacity"]
+        space.overlay.show_overlays = state["overlays"]
+        space.overlay.texture_paint_mode_opacity = state["opacity"]
 
 
 def face_sheet(before: list[dict], centre, size: float) -> None:
@@ -59,8 +59,8 @@ def face_sheet(before: list[dict], centre, size: float) -> None:
 
 def face_head(before: list[dict]) -> None:
     """Return to the viewpoints from before the sheet."""
-    for space, kept in _spaces(before):
-        _look(space, kept["perspective"], kept["rotation"], kept["location"], kept["distance"])
+    for space, state in _spaces(before):
+        _look(space, state["perspective"], state["rotation"], state["location"], state["distance"])
 
 
 def _look(space, perspective: str, rotation, location, distance: float) -> None:
@@ -71,8 +71,8 @@ def _look(space, perspective: str, rotation, location, distance: float) -> None:
 
 def _spaces(before: list[dict]):
     """Yield (space, its state before) of the views that still exist."""
-    for kept in before:
-        screen = bpy.data.screens.get(kept["screen"])
-        area = screen.areas[kept["area"]] if screen and kept["area"] < len(screen.areas) else None
+    for state in before:
+        screen = bpy.data.screens.get(state["screen"])
+        area = screen.areas[state["area"]] if screen and state["area"] < len(screen.areas) else None
         if area and area.type == 'VIEW_3D':
-            yield area.spaces.active, kept
+            yield area.spaces.active, state

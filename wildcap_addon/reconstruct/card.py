@@ -25,13 +25,13 @@ FOLDED = ("runs", "shadows", "weights", "licence")
 
 def draw(layout, item, width: int) -> None:
     """Draw the Delighter panel up to the wipe; delighters that lack something are greyed."""
-    chosen = item.delight.delighter
+    delighter = item.delight.delighter
     grid = layout.grid_flow(columns=COLUMNS, row_major=True, even_columns=True, align=True)
     for name in delighter_cards.choices():
         cell = grid.row(align=True)
-        cell.active = name == chosen or not lacks(item, name)
+        cell.active = name == delighter or not lacks(item, name)
         cell.prop_enum(item.delight, "delighter", name)
-    card = delighter_cards.CARDS[chosen]
+    card = delighter_cards.CARDS[delighter]
     box = layout.box()
     problems.draw_text(box, card.what, width)
     _draw_facts(box, card, width, folded=False)
@@ -42,10 +42,10 @@ def draw(layout, item, width: int) -> None:
     column = layout.column()
     for name in card.settings:
         column.prop(item.delight, name)
-    if chosen == "switchlight":
+    if delighter == "switchlight":
         preferences.draw_key(column, "Key")
         _draw_sending(column, item, width)
-    for reason in lacks(item, chosen):
+    for reason in lacks(item, delighter):
         problems.draw_text(layout.column(), iface_(reason).format(service.WEBSITE), width, 'ERROR')
 
 
@@ -68,8 +68,8 @@ def _draw_facts(layout, card: delighter_cards.Card, width: int, folded: bool) ->
 
 def _draw_sending(layout, item, width: int) -> None:
     """Draw whether the frames may leave the machine, and the button that allows or forbids it."""
-    known = status.of(item)
-    plan = known.sending if known is not None else None
+    capture_status = status.of(item)
+    plan = capture_status.sending if capture_status is not None else None
     if plan is None:
         text = "Which frames are sent is known once Reconstruct has chosen them: it stops then, and asks."
         problems.draw_text(layout, text, width, 'INFO')
@@ -80,7 +80,7 @@ def _draw_sending(layout, item, width: int) -> None:
         return
     words, icon, button = (
         ("You agreed: {} frames go to {} for {}.", 'UNLOCKED', ("wildcap.withdraw_consent", 'X'))
-        if known.agreed
+        if capture_status.agreed
         else (
             "{} frames would go to {} for {}. Nothing is sent before you agree.",
             'LOCKED',

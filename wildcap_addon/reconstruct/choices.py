@@ -45,7 +45,7 @@ class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise storage_problem(error, path) from error
-        selected = list(context.selected_objects)
+        selection = list(context.selected_objects)
         for other in context.view_layer.objects:
             other.select_set(other == thing)
         try:
@@ -60,7 +60,7 @@ class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
             )
         finally:
             for other in context.view_layer.objects:
-                other.select_set(other in selected)
+                other.select_set(other in selection)
         item.registration.template = str(path)
 
 
@@ -124,8 +124,8 @@ class WILDCAP_OT_compare_delit(CaptureOperator, bpy.types.Operator):
         capture = captures.folder(captures.require(context))
         names = delighters.frames(capture)
         before = delighters.shown_frame(capture)
-        following = names.index(before) + 1 if before in names else len(names) // 2
-        delighters.show(capture, self.which if self.which >= 0 else following, context.window_manager.wildcap_wipe)
+        next_index = names.index(before) + 1 if before in names else len(names) // 2
+        delighters.show(capture, self.which if self.which >= 0 else next_index, context.window_manager.wildcap_wipe)
 
 
 CLASSES = (

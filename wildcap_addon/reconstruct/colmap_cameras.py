@@ -62,8 +62,8 @@ def _check(camera: FrameCamera) -> None:
     numbers = (camera.focal, *camera.centre, *(value for row in camera.matrix for value in row))
     if not plain_name(camera.name):
         raise ValueError(f"{camera.name!r} is not the name of a frame")
-    sized = 0 < min(camera.width, camera.height) and max(camera.width, camera.height) <= LONGEST_SIDE_PX
-    if not (sized and camera.focal > 0 and all(map(math.isfinite, numbers))):
+    has_size = 0 < min(camera.width, camera.height) and max(camera.width, camera.height) <= LONGEST_SIDE_PX
+    if not (has_size and camera.focal > 0 and all(map(math.isfinite, numbers))):
         raise ValueError(f"the camera of {camera.name} is implausible")
 
 

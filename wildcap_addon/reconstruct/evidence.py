@@ -35,19 +35,19 @@ def bring_in_cameras(context, item, every: bool = False) -> int:
     capture = captures.folder(item)
     cameras = colmap_cameras.read(capture.cameras)
     if not every:
-        selected = _selected(capture)
-        cameras = [camera for camera in cameras if camera.name in selected] or cameras
+        selection = _selected(capture)
+        cameras = [camera for camera in cameras if camera.name in selection] or cameras
     frame = context.scene.camera.get(FRAME_KEY) if context.scene.camera is not None else None
-    known = {thing[FRAME_KEY]: thing for thing in _brought_in(item, 'camera')}
-    homes = [home for thing in known.values() for home in thing.users_collection]
-    things = [_camera(context, item, capture, camera, known.pop(camera.name, None)) for camera in cameras]
+    existing = {thing[FRAME_KEY]: thing for thing in _brought_in(item, 'camera')}
+    homes = [home for thing in existing.values() for home in thing.users_collection]
+    things = [_camera(context, item, capture, camera, existing.pop(camera.name, None)) for camera in cameras]
     new = [thing for thing in things if not thing.users_collection]
     if new and not homes:
         homes = [bpy.data.collections.new(f"{item.name} Cameras")]
         context.scene.collection.children.link(homes[0])
     for thing in new:
         homes[0].objects.link(thing)
-    _remove(known.values())
+    _remove(existing.values())
     if context.scene.camera is None:
         context.scene.camera = next((thing for thing in things if thing[FRAME_KEY] == frame), things[0])
     local_view.join(context, new)
@@ -61,7 +61,7 @@ def bring_in_scan(context, item) -> bpy.types.Object:
         raise Problem("This capture has no scan yet.", "Click Reconstruct: it is made from the frames.")
     objects, before = context.view_layer.objects, set(context.scene.objects)
     active = objects.active.name if objects.active is not None else ""
-    selected = [thing.name for thing in context.selected_objects]  # by name, as an older scan among them is removed
+    selection = [thing.name for thing in context.selected_objects]  # by name, as an older scan among them is removed
     with contextlib.suppress(RuntimeError):  # not a PLY: nothing came in
         bpy.ops.wm.ply_import(filepath=str(capture.scan), forward_axis='Y', up_axis='Z')
     new = [thing for thing in context.scene.objects if thing not in before]
@@ -75,7 +75,7 @@ def bring_in_scan(context, item) -> bpy.types.Object:
     _mark(scan, context, item, 'scan')
     context.view_layer.update()  # it does not yet know what was removed
     for thing in objects:
-        thing.select_set(thing.name in selected)
+        thing.select_set(thing.name in selection)
     objects.active = objects.get(active) or scan
     local_view.join(context, [scan])
     return scan
@@ -97,14 +97,14 @@ def _camera(
     if (capture.frames / camera.name).is_file():
         lens.show_background_images = True
         image = bpy.data.images.load(str(capture.frames / camera.name), check_existing=True)
-        behind = next((known for known in lens.background_images if known.image == image), None)
-        if behind is None:
-            behind = lens.background_images.new()
-            behind.image, behind.alpha = image, 1.0
+        background = next((existing for existing in lens.background_images if existing.image == image), None)
+        if background is None:
+            background = lens.background_images.new()
+            background.image, background.alpha = image, 1.0
         # the sensor has the frame's width: a wider render cuts the frame's height, a narrower one shows more
         render = context.scene.render
         wider = camera.width * render.resolution_y <= camera.height * render.resolution_x
-        behind.frame_method = 'CROP' if wider else 'FIT'
+        background.frame_method = 'CROP' if wider else 'FIT'
     if thing is None:
         thing = bpy.data.objects.new(lens.name, lens)
     thing.data = lens

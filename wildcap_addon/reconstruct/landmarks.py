@@ -85,14 +85,14 @@ def shown_landmarks(item) -> list[bpy.types.Object]:
 
 def keep_moved(item) -> int:
     """Store moved landmarks in the capture, where they override those of the frames, and return how many."""
-    moved = {
+    corrections = {
         o[INDEX_KEY]: tuple(o.location)
         for o in shown_landmarks(item)
         if (o.location - Vector(o[FOUND_KEY])).length > MOVED_M
     }
-    if moved:
-        artist_landmarks.put(captures.folder(item), moved)
-    return len(moved)
+    if corrections:
+        artist_landmarks.put(captures.folder(item), corrections)
+    return len(corrections)
 
 
 def hide(item) -> None:

@@ -57,14 +57,14 @@ def update(root: str) -> None:
 
     Makes no data-blocks.
     """
-    ended = jobs.of(root) is None
+    has_ended = jobs.of(root) is None
     _ended.discard(root)
-    if ended and bpy.context.mode == 'PAINT_TEXTURE':
+    if has_ended and bpy.context.mode == 'PAINT_TEXTURE':
         _ended.add(root)  # the active node may be the canvas
-    if root in _ended or not ended and bpy.context.mode != 'OBJECT':
+    if root in _ended or not has_ended and bpy.context.mode != 'OBJECT':
         return
     for nodes, node in _nodes(root):
-        if ended:
+        if has_ended:
             nodes.active = nodes.get(node.get("before", "")) or nodes.active
         elif Path(bpy.path.abspath(node.image.filepath)).is_file():
             node.image.reload()

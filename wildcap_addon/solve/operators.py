@@ -36,9 +36,9 @@ class WILDCAP_OT_solve_edited(BaseOperator, bpy.types.Operator):
     def poll(cls, context):
         if not jobs.can_start(cls, context):
             return False
-        known = status.of(captures.active(context))
-        return cls.allowed(known is not None, "Looking at the capture ...") and cls.allowed(
-            not known.whole_solve, f"{known.whole_solve} Click Solve for the whole map"
+        capture_status = status.of(captures.active(context))
+        return cls.allowed(capture_status is not None, "Looking at the capture ...") and cls.allowed(
+            not capture_status.whole_solve, f"{capture_status.whole_solve} Click Solve for the whole map"
         )
 
     def work(self, context):

@@ -58,10 +58,11 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
                 draw_settings(layout, item, stage, without=("skin_tone", "white_point", "together"))
 
 
-def tone_words(item, known: status.Status | None) -> str:
+def tone_words(item, capture_status: status.Status | None) -> str:
     """Describe the source of the skin tone and its uncertainty."""
     if not item.use_skin_tone:
-        findings = [f for f in (known.findings if known else ()) if f["stage"] == "solve" and not f["stopped"]]
+        findings = capture_status.findings if capture_status else ()
+        findings = [finding for finding in findings if finding["stage"] == "solve" and not finding["stopped"]]
         if findings:
             return " ".join(iface_(findings[-1][part]) for part in ("problem", "remedy"))
         return iface_("Estimated from the frames when the maps are solved")
@@ -75,11 +76,13 @@ def tone_words(item, known: status.Status | None) -> str:
 
 
 def _draw_white_point(layout, item) -> None:
-    measured = item.solve.white_point != "auto"
+    is_measured = item.solve.white_point != "auto"
     row = layout.row(align=True)
-    words = ", ".join(band[:4] for band in item.solve.white_point.split(",")) if measured else iface_("from the scene")
+    words = iface_("from the scene")
+    if is_measured:
+        words = ", ".join(band[:4] for band in item.solve.white_point.split(","))
     row.label(text=iface_("White Point: {}").format(words))
-    if measured:
+    if is_measured:
         row.operator("wildcap.clear_white_point", text="", icon='X')
     layout.operator("wildcap.find_color_checker")
     row = layout.row(align=True)
