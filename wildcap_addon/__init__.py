@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The add-on: everything that runs inside Blender. Of `core` it imports the ground floor; a worker does the heavy work.
+"""Add-on: everything that runs inside Blender. Of `core` it imports the ground floor; a worker does the heavy work.
 
 The rooms register in this order and unregister in reverse.
 """

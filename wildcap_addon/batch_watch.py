@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The thread that watches a batch: the machine that runs it, its progress and the state of each face.
+"""Thread that watches a batch: the machine that runs it, its progress and the state of each face.
 
 The first look at a face reads all its files, later ones compare a few file times. Nothing here touches Blender.
 """
@@ -30,7 +30,7 @@ may lose a tenth. The limit keeps the display current."""
 
 @dataclass(frozen=True)
 class BatchView:
-    """What is known of a batch.
+    """Known state of a batch.
 
     `states` has the faces that were examined, by name; `runner` is the machine that runs it, '' for none; `progress`
     comes from that run; `problem` is why the batch cannot be used.

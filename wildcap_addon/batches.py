@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The batch shown in the tab: many faces processed outside Blender, by another process or a farm.
+"""Batch shown in the tab: many faces processed outside Blender, by another process or a farm.
 
 Progress is stored in the captures. A thread reads them, `poll` takes over what it found, panels read only that. The
 extension's user folder remembers the batches, so that Blender finds them again after a restart. Run-time state only.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The capture that panels and operators act on: that of the active head, or the active one of the scene's list."""
+"""Capture that panels and operators act on: that of the active head, or the active one of the scene's list."""
 
 from functools import lru_cache
 from pathlib import Path

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension's own package as Blender has named it, bl_ext.REPOSITORY.wildcap, and the files of its user folder."""
+"""Name of the extension's package in Blender, bl_ext.REPOSITORY.wildcap, and the files of its user folder."""
 
 from pathlib import Path
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The head object of a capture: head.obj in the scene with its UVs and its texture, updated in place."""
+"""Head object of a capture: head.obj in the scene with its UVs and its texture, updated in place."""
 
 from pathlib import Path
 

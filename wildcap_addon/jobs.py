@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The running jobs, one per capture, and the solver's installation: started by operators, polled by a timer.
+"""Running jobs, one per capture, and the solver's installation: started by operators, polled by a timer.
 
 One worker runs at a time, as each uses all cores; jobs of other captures wait in line. Run-time state only. A job
 belongs to its capture: another .blend, a new scene or an undo past its start do not affect it; disabling the add-on or
@@ -30,7 +30,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 @dataclass
 class Job:
-    """A worker at a capture, and its last messages."""
+    """Worker at a capture, and its last messages."""
 
     # 'make', 'reconstruct', 'solve', 'tool', 'deliver', 'install', 'test', or 'ask' for what takes seconds
     goal: str

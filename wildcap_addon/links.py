@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The link from a .blend to its captures: kept by Save As, found after both were moved or copied, repaired by Locate.
+"""Link from a .blend to its captures: kept by Save As, found after both were moved or copied, repaired by Locate.
 
 In a session a capture's path is absolute. Saving also stores the path relative to the .blend, and opening prefers that
 if it leads to a folder: a copied project works on its own captures. A .blend moved alone uses the absolute one.

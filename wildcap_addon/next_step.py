@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The next step: one function from facts to a button. Independent of bpy, so that every state can be tested."""
+"""Next step: one function from facts to a button. Independent of bpy, so that every state can be tested."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Facts:
 
 @dataclass(frozen=True)
 class NextStep:
-    """A line of state, the large button below it ('' for no operator), and a small one (label, operator, icon)."""
+    """Line of state, the large button below it ('' for no operator), and a small one (label, operator, icon)."""
 
     state: str
     label: str

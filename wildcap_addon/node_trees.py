@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shader nodes of materials and worlds.
+"""Shader nodes of materials and worlds.
 
 From Blender 5.0 on they always exist, and enabling them is deprecated.
 """

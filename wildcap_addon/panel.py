@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tab: a line of state, the button for the next step, running jobs, and a row per stage."""
+"""Tab: a line of state, the button for the next step, running jobs, and a row per stage."""
 
 from pathlib import Path
 

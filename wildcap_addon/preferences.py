@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension's preferences: the solver's Python, and the folder of captures."""
+"""Preferences of the extension: the solver's Python, and the folder of captures."""
 
 import os
 import sys

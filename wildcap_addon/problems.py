@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The last problem of each capture and its remedy, shown under the next step until something succeeds."""
+"""Last problem of each capture and its remedy, shown under the next step until something succeeds."""
 
 import textwrap
 

@@ -156,7 +156,7 @@ LIGHTS = (
 
 
 class WILDCAP_PG_scene(bpy.types.PropertyGroup):
-    """The scene's captures and their light."""
+    """Captures of the scene, and their light."""
 
     captures: bpy.props.CollectionProperty(type=WILDCAP_PG_capture)
     active_index: bpy.props.IntProperty(

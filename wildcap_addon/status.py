@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The state of each capture's stages and results, read outside `draw` and kept until the folder or the settings change.
+"""State of each capture's stages and results, read outside `draw` and kept until the folder or the settings change.
 
 A panel asks `of(item)`, which returns the last result and marks the capture as wanted; a timer looks for news.
 """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The record of a batch of the listed captures, which stay in their folders, with the panels' settings."""
+"""Record of a batch of the listed captures, which stay in their folders, with the panels' settings."""
 
 import itertools
 import time

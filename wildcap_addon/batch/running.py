@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The process that runs a batch: independent of Blender, stopped by a file, observed through the files it writes."""
+"""Process that runs a batch: independent of Blender, stopped by a file, observed through the files it writes."""
 
 import contextlib
 import os

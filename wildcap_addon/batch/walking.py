@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The walk through a batch's masks: the next face comes into the scene, the previous one is put aside."""
+"""Walk through a batch's masks: the next face comes into the scene, the previous one is put aside."""
 
 from pathlib import Path
 

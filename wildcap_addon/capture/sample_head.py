@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sample head, copied to the artist's captures and shown; needs no solver."""
+"""Sample head, copied to the artist's captures and shown; needs no solver."""
 
 import bpy
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scene's cameras as JSON for the setting `cameras.import_from`.
+"""Cameras of the scene as JSON for the setting `cameras.import_from`.
 
 core/stages/cameras/importers/blender_cameras.py documents the layout. Not a button:
 `write_cameras(bpy.context.scene, "cameras.json")` from Blender's console or a script.

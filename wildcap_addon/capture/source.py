@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The video or the photographs of a face: chosen in the file browser, or dropped on a 3D view with the WildCap tab."""
+"""Video or photographs of a face: chosen in the file browser, or dropped on a 3D view with the WildCap tab."""
 
 import re
 from pathlib import Path

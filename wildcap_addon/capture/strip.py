@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A strip of a capture's frames with their sharpness, read by a timer once a panel wants it."""
+"""Strip of a capture's frames with their sharpness, read by a timer once a panel wants it."""
 
 from dataclasses import dataclass
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The subcommands run and solve, executed by the solver of this Blender's preferences."""
+"""Subcommands run and solve, executed by the solver of this Blender's preferences."""
 
 import argparse
 import subprocess

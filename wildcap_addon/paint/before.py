@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The artist's state before painting: canvas, stencil, symmetry, views, active object, selection and mode.
+"""Artist's state before painting: canvas, stencil, symmetry, views, active object, selection and mode.
 
 It consists of names and plain values: an undo replaces every data-block, and a .blend saved during painting stores it
 as JSON.

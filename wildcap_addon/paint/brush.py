@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mask brush: Blender 4.2 assigns brushes, later versions activate them as assets.
+"""Mask brush: Blender 4.2 assigns brushes, later versions activate them as assets.
 
 A MASK brush paints its weight into the stencil image, the opposite with Ctrl held.
 """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A painting session while .blend files are saved and opened, and after an undo.
+"""Painting session while .blend files are saved and opened, and after an undo.
 
 Nothing that was painted is lost, and a file that was saved during painting reopens in it.
 """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The artist's masks as Blender images, and back to the capture's shadow_mask.png and protect_mask.png.
+"""Masks of the artist as Blender images, and back to the capture's shadow_mask.png and protect_mask.png.
 
 The only place of the add-on that flips rows: Blender counts an image's rows from the bottom, files from the top.
 """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The two places to paint a mask, the head and the flat sheet, and the changes between them.
+"""Two places to paint a mask, the head and the flat sheet, and the changes between them.
 
 The scene decides which one is in use, as an undo may remove the sheet or bring it back.
 """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A painting session: from Paint Mask to the saved mask, with the artist's state restored.
+"""Painting session: from Paint Mask to the saved mask, with the artist's state restored.
 
 The session consists of names and values, as an undo replaces every data-block. However the artist leaves (the button,
 Tab, opening or saving a file), the mask is saved in the capture, and within seconds of each stroke, in case Blender is
@@ -27,7 +27,7 @@ KEEP_UP_S = 3.0
 
 @dataclass
 class Session:
-    """The painted mask, and the artist's state before."""
+    """Painted mask, and the artist's state before."""
 
     root: str
     scene: str

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flat sheet: a square with the whole texture, seen from above, to paint the mask in UV space.
+"""Flat sheet: a square with the whole texture, seen from above, to paint the mask in UV space.
 
 It stores what it hides in a property of its own, which an undo restores together with it.
 """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The 3D views during painting: flat texture under the tinted mask; and their state before."""
+"""3D views during painting: flat texture under the tinted mask; and their state before."""
 
 import bpy
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The choice of the delighter: all of them, and the card, settings and needs of the chosen one."""
+"""Choice of the delighter: all of them, and the card, settings and needs of the chosen one."""
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_

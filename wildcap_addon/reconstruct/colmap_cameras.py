@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture's cameras, read from COLMAP's binary files without the package that the worker uses.
+"""Cameras of a capture, read from COLMAP's binary files without the package that the worker uses.
 
 File format: https://colmap.github.io/format.html (cameras.bin, images.bin).
 """

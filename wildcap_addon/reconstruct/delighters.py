@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A frame before and after delighting, with a wipe between them.
+"""Frame before and after delighting, with a wipe between them.
 
 The wipe is an icon, so that no data-block stays behind. Its frame is read by the operator, not while a panel is drawn.
 """

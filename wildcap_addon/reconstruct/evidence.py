@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The cameras, with their frames as backgrounds, and the scan, brought into the scene.
+"""Cameras, with their frames as backgrounds, and the scan, brought into the scene.
 
 Both are children of the head, if it is there; their own coordinates are those of the capture's world (metres).
 """

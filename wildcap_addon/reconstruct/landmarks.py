@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The landmarks that placed the head, as empties on it: the artist corrects them, and the head is fitted again.
+"""Landmarks that placed the head, as empties on it: the artist corrects them, and the head is fitted again.
 
 Each empty is a child of the head; its own coordinates are those of the capture's world.
 """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solver's environment: installation or an existing Python, checks, and the self-test."""
+"""Environment of the solver: installation or an existing Python, checks, and the self-test."""
 
 import bpy
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The running solve's albedo on the head: an image node in its material, made by Solve and reloaded by the timer.
+"""Albedo of the running solve on the head: an image node in its material, made by Solve and reloaded by the timer.
 
 Solid shading shows a material's active image node, so no links are needed and the artist's own nodes are kept. Nothing
 changes while somebody paints or edits.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pictures of a running solve in the panel."""
+"""Pictures of a running solve in the panel."""
 
 from ...core.capture.capture import Capture
 from ..frame_icons import load
