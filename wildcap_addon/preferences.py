@@ -56,29 +56,32 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
     environment: bpy.props.StringProperty(
         name="Solver Folder",
         subtype='DIR_PATH',
-        description="Where Install Solver puts its packages; empty: .wildcap/solver in your home folder",
+        description="Folder of Install Solver's packages; empty: .wildcap/solver in your home folder",
     )
     compute: bpy.props.EnumProperty(
-        name="Compute On", items=COMPUTES, default='auto', description="What Install Solver downloads PyTorch for"
+        name="Compute On",
+        items=COMPUTES,
+        default='auto',
+        description="Hardware that Install Solver downloads PyTorch for",
     )
     packages: bpy.props.EnumProperty(
-        name="Packages From", items=SOURCES, default='pytorch', description="Where Install Solver downloads from"
+        name="Packages From", items=SOURCES, default='pytorch', description="Source of Install Solver's downloads"
     )
     wheels: bpy.props.StringProperty(
         name="Wheels",
         subtype='DIR_PATH',
         description="The folder of wheels that Install Solver takes all packages from",
     )
-    device: bpy.props.StringProperty(name="Device", description="What the solver's Python was found to compute on")
+    device: bpy.props.StringProperty(name="Device", description="Device that the solver's Python computes on")
     device_reason: bpy.props.StringProperty(
-        name="Why This Device", description="What was found when the solver's devices were tried"
+        name="Why This Device", description="Result of the test of the solver's devices"
     )
-    tested: bpy.props.StringProperty(name="Self-Test", description="How the last self-test ended")
+    tested: bpy.props.StringProperty(name="Self-Test", description="Result of the last self-test")
     captures: bpy.props.StringProperty(
         name="Captures Folder",
         subtype='DIR_PATH',
-        description="Where new captures go while the .blend is not saved; empty: WildCap in your home folder, which no "
-        "cloud copies",
+        description="Folder of new captures while the .blend is not saved; empty: WildCap in your home folder, which "
+        "no cloud copies",
     )
 
     switchlight_key: bpy.props.StringProperty(

@@ -92,15 +92,15 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
         items=[(q, q.title(), "") for q in core_settings.QUALITIES],
         default="standard",
         update=_apply_quality,
-        description="Draft to look, standard to work, film to deliver. Choosing one sets the fields of all stages that "
-        "it covers: change single ones afterwards",
+        description="Draft for previews, standard for work, film for delivery. Choosing one sets the fields of all "
+        "stages that it covers: change single ones afterwards",
     )
     device: bpy.props.EnumProperty(
         name="Device",
         default="auto",
         description=SHARED_TOOLTIPS["device"],
         items=[
-            ("auto", "Automatic", "Where a pass of the solver's network ran fastest when it was set up"),
+            ("auto", "Automatic", "The device on which the solver's network ran fastest when it was set up"),
             ("cpu", "CPU", ""),
             ("cuda", "CUDA", ""),
             ("mps", "Metal", ""),
@@ -122,16 +122,14 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
         description="Mean colour of the facial skin without lips, brows and stubble, as the eye sees it (sRGB)",
     )
     estimated_tone: bpy.props.FloatVectorProperty(
-        name="Estimated Tone", size=3, options={'HIDDEN'}, description="What the last estimate was"
+        name="Estimated Tone", size=3, options={'HIDDEN'}, description="Last estimated tone"
     )
-    tone_group: bpy.props.StringProperty(
-        name="Tone Group", options={'HIDDEN'}, description="What such a tone is called"
-    )
+    tone_group: bpy.props.StringProperty(name="Tone Group", options={'HIDDEN'}, description="Name of the tone's group")
     tone_source: bpy.props.StringProperty(
-        name="Tone Source", options={'HIDDEN'}, description="What the last estimate was taken from"
+        name="Tone Source", options={'HIDDEN'}, description="Source of the last estimate"
     )
     tone_deviation: bpy.props.FloatProperty(
-        name="Tone Deviation", options={'HIDDEN'}, description="One deviation of its lightness L*"
+        name="Tone Deviation", options={'HIDDEN'}, description="Standard deviation of its lightness L*"
     )
 
 
@@ -176,13 +174,13 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
     hdri_file: bpy.props.StringProperty(
         name="Own File",
         subtype='FILE_PATH',
-        description="A panoramic HDR picture of your own; it comes before the one above",
+        description="A panoramic HDR picture of your own; it replaces the one above",
     )
     hdri_rotation: bpy.props.FloatProperty(
         name="Rotation", subtype='ANGLE', description="Turns the light about the head, counter-clockwise from above"
     )
     hdri_strength: bpy.props.FloatProperty(
-        name="Strength", min=0, soft_max=4, default=1, description="How bright the surroundings are"
+        name="Strength", min=0, soft_max=4, default=1, description="Brightness of the surroundings"
     )
     shadow_tint: bpy.props.FloatVectorProperty(
         name="Shadow Tint",
@@ -203,7 +201,7 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
         description="Colour in which the protect mask is shown",
     )
     tint_strength: bpy.props.FloatProperty(
-        name="Tint Strength", min=0.05, max=1, default=0.45, description="How strongly a mask covers the texture"
+        name="Tint Strength", min=0.05, max=1, default=0.45, description="Opacity of a mask over the texture"
     )
     resolution: bpy.props.IntProperty(
         name="Resolution", subtype='PIXEL', min=16, max=8192, default=1024, description="Side of the rendered picture"
@@ -214,13 +212,13 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
     view: bpy.props.EnumProperty(
         name="View",
         default='Standard',
-        description="How the picture is shown; the linear EXR beside it is the same in both",
+        description="View transform of the picture; the linear EXR beside it is the same in both",
         items=[
             ('Standard', "Standard", "Colours as they are; what is brighter than white is cut off"),
             (
                 'AgX',
                 "AgX",
-                "As on film: bright lights and strong colours fade softly; a skin's tone is not what it was",
+                "As on film: bright lights and strong colours fade softly, which changes the skin tone",
             ),
         ],
     )
@@ -239,7 +237,7 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
     turn_file: bpy.props.EnumProperty(
         name="As",
         default='MP4',
-        description="What renders/turntable gets",
+        description="Format of renders/turntable",
         items=[('MP4', "Video", "One MP4"), ('PNG', "Pictures", "A PNG per frame")],
     )
 

@@ -77,10 +77,3 @@ def test_a_head_that_older_code_made_is_painted_on_assembled_and_rendered_and_no
     assert bpy.ops.wildcap.deliver.poll() and not started.called
     changed = {path.relative_to(updated).as_posix() for path, content in before.items() if path.read_bytes() != content}
     assert changed <= {"report.html", "written.jsonl"}, "a look, a material and a render change nothing that was made"
-
-
-def test_a_mask_painted_after_the_update_asks_for_a_solve_alone(updated, look):
-    (updated / "shadow_mask.png").write_bytes(standin.plain((255,)))
-    bpy.ops.wildcap.bring_in_head()
-    states, operator = look()
-    assert operator == "solve" and states == {**dict.fromkeys(stages.NAMES, "older"), "solve": "stale"}

@@ -42,7 +42,7 @@ def test_the_walk_goes_through_the_masks_that_wait(addon, batches, monkeypatch, 
     assert tones == ["0.5,0.25,0.125", "0.6000,0.2500,0.1250"], "or what was solved would be out of date here"
     wait(addon, lambda: batch_faces.seen(batches))
     assert names(batches.waiting()) == ["anna", "carl"] and batches.view().count(state.TO_DO) == 1
-    assert ("Masks waiting: 2, to do: 1", False) in drawn(panel)
+    assert ("Masks waiting: 2, to do: 1", False) in drawn(panel) and "wildcap.accept_mask" in buttons(panel)
     click.next_mask()
     assert session.root() == str(faces[0].root)
     assert bpy.context.mode == 'PAINT_TEXTURE' and bpy.context.object.name == "anna"

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from core.capture import ownership
-from core.capture.capture import Capture
 from tests.fixtures.polled_jobs import follow
 
 bpy = pytest.importorskip("bpy")
@@ -36,11 +35,3 @@ def test_the_list_comes_first_and_then_all_of_it_goes(addon, face):
     assert [path.name for path in face.iterdir()] == ["notes.txt"]
     assert len(bpy.context.scene.wildcap.captures) == 0 and head.name in bpy.data.objects
     assert addon("problems").of("") is None
-
-
-def test_a_face_that_is_worked_on_elsewhere_stays_and_stays_on_the_list(addon, face):
-    with Capture(face).locked():
-        bpy.ops.wildcap.delete_face()
-        follow(addon)
-    assert "working on this capture" in addon("problems").of("").problem and (face / "head.obj").is_file()
-    assert len(bpy.context.scene.wildcap.captures) == 1

@@ -23,10 +23,6 @@ def test_a_report_is_saved_with_blender_s_version_and_no_name_of_the_capture(add
     with zipfile.ZipFile(target) as archive:
         assert bpy.app.version_string in archive.read("report.json").decode()
         assert archive.read("logs/solve.log").decode() == "reading <capture>/texture.exr of <removed>"
-    before = target.read_bytes()
-    bpy.ops.wildcap.save_report(filepath=str(target))
-    follow(addon)
-    assert "already exists" in addon("problems").of("").problem and target.read_bytes() == before
 
 
 def test_the_button_stands_beside_a_problem_and_not_beside_a_notice(addon):
