@@ -105,13 +105,47 @@ def capture(tmp_path, wildcap):
 
 
 @pytest.fixture
-def batches(addon, monkeypatch, tmp_path):
+def item(addon, capture):
+    """The list's item of `capture`."""
+    import bpy
+
+    return addon("captures").active(bpy.context)
+
+
+@pytest.fixture(scope="session")
+def tiny_code(tmp_path_factory):
+    """The code tree of tiny_chain, for tests that change nothing of it."""
+    from tests.fixtures import tiny_chain
+
+    root = tiny_chain.build(tmp_path_factory.mktemp("tiny") / "code")
+    tiny_chain.keep_pace(root)
+    tiny_chain.compile_once(root)
+    return root
+
+
+@pytest.fixture
+def jobs(addon, monkeypatch, tiny_code):
+    """The add-on's jobs, over a chain of tiny rooms that this very Python runs."""
+    from tests.fixtures.polled_jobs import follow
+
+    module = addon("jobs")
+    monkeypatch.setattr(module, "ROOT", tiny_code)
+    addon("preferences").get().python = sys.executable
+    yield module
+    for root in list(module._jobs):
+        module.cancel(root)
+    follow(addon)
+    addon("preferences").get().python = ""
+
+
+@pytest.fixture
+def batches(addon, monkeypatch, tmp_path, tiny_code):
     """The add-on's view of batches, over a chain of tiny rooms; no batch of a test is left running, or known to the
     next one."""
-    from tests.fixtures import batch_faces, tiny_chain
+    from tests.fixtures import batch_faces
 
     module, running = addon("batches"), addon("batch.running")
-    monkeypatch.setattr(addon("jobs"), "ROOT", tiny_chain.build(tmp_path / "code"))
+    monkeypatch.setattr(addon("jobs"), "ROOT", tiny_code)
     addon("problems").clear("")
     preferences = addon("preferences").get()
     preferences.python, preferences.captures = sys.executable, str(tmp_path / "captures")

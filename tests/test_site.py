@@ -113,6 +113,5 @@ def test_links_are_shown_once_they_are_set(addon, monkeypatch):
     ):
         monkeypatch.setattr(preferences.links, "WEBSITE", website)
         monkeypatch.setattr(preferences.links, "REPORTS", reports)
-        found: list = []
-        preferences.draw_links(Layout(found))
-        assert [text for text, _ in found] == shown
+        preferences.draw_links(layout := Layout())
+        assert [text for text, _ in layout.texts] == shown

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The add-on: what runs inside Blender. Of `core` it imports the ground floor only; the heavy work is a worker's.
+"""Add-on: everything that runs inside Blender. Of `core` it imports the ground floor; a worker does the heavy work.
 
-Rooms, in the order in which they register; each has `register` and `unregister`, and they leave in reverse.
+The rooms register in this order and unregister in reverse.
 """
 
 from . import (

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a dialog has to say and takes seconds to find out (how much to download, what is deleted): found in the
-background, then the dialog opens."""
+"""Answers that a dialog needs before it opens and that take seconds to find, such as the size of a download."""
 
 from collections.abc import Callable
 
@@ -14,7 +13,7 @@ _answers: dict[tuple, object] = {}
 
 
 def answer(key: tuple):
-    """What was found for a question; None: not asked yet."""
+    """Return the answer to a question, or None before it is known."""
     return _answers.get(key)
 
 
@@ -23,33 +22,43 @@ def forget(key: tuple) -> None:
 
 
 def find_answer(
-    key: tuple, work: Callable[[BackgroundTask], object], operator: str, meant: Callable[[], bool] = lambda: True
-) -> None:
-    """Runs a job that the tab shows and that finds an answer; then the operator's dialog opens as if it were clicked
-    again.
+    key: tuple,
+    text: str,
+    work: Callable[[BackgroundTask], object],
+    operator: str,
+    is_wanted: Callable[[], bool] = lambda: True,
+):
+    """Return the answer to a question; if it is unknown, None, and find it with `work(task)` in the background.
 
-    Parameters
-    ----------
-    key : the question's, as `answer` takes it
-    work : work(task) finds the answer, in a thread
-    operator : its name after "wildcap."
-    meant : whether the artist still means it when the answer is there; else no dialog opens
+    Once the answer is there, the dialog of `wildcap.OPERATOR` opens if `is_wanted` still holds.
     """
-    task = BackgroundTask("setup", work)
+    if key in _answers:
+        return _answers[key]
 
-    def then() -> None:
-        _answers[key] = task.result
-        _click(operator, meant)
+    def then(result) -> None:
+        _answers[key] = result
+        _open(operator, is_wanted)
 
-    jobs.start_worker("", "ask", task, then)
+    run(text, work, then)
+    return None
 
 
-def _click(operator: str, meant: Callable[[], bool]) -> None:
-    """Opens the operator's dialog where it is allowed and meant; not under an artist who is in the middle of something:
-    then the next click shows it at once."""
+def run(text: str, work: Callable[[BackgroundTask], object], then: Callable[[object], None]) -> None:
+    """Run `work(task)` in the background as a job that shows `text`; `then` gets its result."""
+
+    def talk(task: BackgroundTask):
+        task.say(0, 1, text)
+        return work(task)
+
+    task = BackgroundTask("setup", talk)
+    jobs.start_worker("", "ask", task, lambda: then(task.result))
+
+
+def _open(operator: str, is_wanted: Callable[[], bool]) -> None:
+    """Open the operator's dialog, except during a modal operation: the next click then opens it at once."""
     windows = [] if bpy.app.background else bpy.context.window_manager.windows
     if windows and not any(window.modal_operators for window in windows):
         with bpy.context.temp_override(window=windows[0]):
             dialog = getattr(bpy.ops.wildcap, operator)
-            if meant() and dialog.poll():
+            if is_wanted() and dialog.poll():
                 dialog('INVOKE_DEFAULT')

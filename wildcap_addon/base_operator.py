@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all operators share: any exception becomes a problem and a remedy in the panel, never a traceback in the
-artist's face; and how they ask first."""
+"""Base classes of the operators: errors become problems in the panel, buttons explain why they are disabled."""
 
 from pathlib import Path
 
@@ -13,30 +12,30 @@ from ..core.capture.messages import Problem
 from . import captures, jobs, problems, status
 
 WIDTH_PX = 460
-"""Of a dialog, pixels"""
+"""Width of a dialog, pixels."""
 
 
 class BaseOperator:
-    """Mixin: an operator says what it does in `work(context)` and raises Problem for what the artist can mend."""
+    """Operator that does its work in `work(context)` and raises Problem for what the artist can correct."""
 
     bl_options = {'REGISTER'}
 
     def __init_subclass__(cls, **options):
-        """The docstring is the tooltip, in one line: Blender would show its breaks and its indentation."""
+        """Use the docstring as the tooltip: one line, without the full stop."""
         super().__init_subclass__(**options)
         if cls.__doc__:
-            cls.bl_description = " ".join(cls.__doc__.split())
+            cls.bl_description = " ".join(cls.__doc__.split()).removesuffix(".")
 
     @classmethod
     def allowed(cls, condition, why_not: str) -> bool:
-        """For `poll`: whether the condition holds; where it does not, the tooltip of the greyed-out button says why."""
+        """Return whether the condition holds; if not, give the disabled button's tooltip the reason. For `poll`."""
         if not condition:
             cls.poll_message_set(iface_(why_not))
         return bool(condition)
 
     @classmethod
     def in_object_mode(cls, context) -> bool:
-        """For `poll`: data-blocks are made in Object Mode only, never in the middle of a stroke."""
+        """Allow Object Mode only: data-blocks must not appear in the middle of a stroke. For `poll`."""
         return cls.allowed(context.mode == 'OBJECT', "This works in Object Mode only: leave painting or editing first")
 
     @classmethod
@@ -64,7 +63,7 @@ class BaseOperator:
         raise NotImplementedError
 
     def warn(self, text: str) -> None:
-        """Tells something that does not stop the work; '' for nothing."""
+        """Report something that does not stop the work; '' for nothing."""
         if text:
             self.report({'WARNING'}, rpt_(text))
 
@@ -75,7 +74,7 @@ class BaseOperator:
 
 
 class CaptureOperator(BaseOperator):
-    """Mixin: an operator that works on the active capture."""
+    """Operator on the active capture."""
 
     @classmethod
     def poll(cls, context):
@@ -83,7 +82,9 @@ class CaptureOperator(BaseOperator):
 
 
 class HeadOperator(BaseOperator):
-    """Mixin: an operator that makes or changes what the active capture has in the scene."""
+    """Operator that makes or changes the active capture's objects in the scene."""
+
+    bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
     def poll(cls, context):
@@ -91,7 +92,7 @@ class HeadOperator(BaseOperator):
 
 
 class JobOperator(BaseOperator):
-    """Mixin: an operator that starts a job on the active capture."""
+    """Operator that starts a job on the active capture."""
 
     @classmethod
     def poll(cls, context):
@@ -99,7 +100,7 @@ class JobOperator(BaseOperator):
 
 
 class FileOperator(BaseOperator):
-    """Mixin: an operator that asks for a file or folder first."""
+    """Operator that asks for a file or folder first."""
 
     def invoke(self, context, event):
         context.window_manager.fileselect_add(self)
@@ -107,8 +108,7 @@ class FileOperator(BaseOperator):
 
 
 class Dialog(BaseOperator):
-    """Mixin: an operator that asks for a yes to `lines`. `tell()` gives them, or None while they are being found
-    out."""
+    """Operator that asks for confirmation; `tell()` returns the dialog's lines, or None while they are prepared."""
 
     lines: tuple[str, ...] = ()
 

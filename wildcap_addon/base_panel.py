@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all panels share: where they are, how wide, and how a stage's settings are listed."""
+"""Base classes of the panels, their width, and the list of a stage's settings."""
 
 from dataclasses import fields
 
@@ -11,11 +11,11 @@ from . import captures
 from .properties import STAGE_KINDS
 
 NARROW_PX = 260
-"""Below this width, at a user interface scale of one, two buttons in a row or a name beside its value are cut"""
+"""Width below which, at a user interface scale of one, two buttons in a row or a name beside its value are cut."""
 
 
 class WildcapPanel:
-    """Mixin: a panel of the WildCap tab."""
+    """Panel of the WildCap tab."""
 
     bl_space_type = 'VIEW_3D'
     bl_region_type = 'UI'
@@ -23,14 +23,14 @@ class WildcapPanel:
 
 
 class FoldedPanel(WildcapPanel):
-    """Mixin: a room's folded panel under the main one."""
+    """Folded panel under the main one."""
 
     bl_parent_id = "WILDCAP_PT_main"
     bl_options = {'DEFAULT_CLOSED'}
 
 
 class CapturePanel(FoldedPanel):
-    """Mixin: a folded panel that needs a capture."""
+    """Folded panel that needs a capture."""
 
     @classmethod
     def poll(cls, context):
@@ -38,28 +38,19 @@ class CapturePanel(FoldedPanel):
 
 
 def region_width(context) -> int:
-    """Width of what is drawn into, in pixels; a sidebar's usual one outside of a window."""
+    """Return the width of the region in pixels; outside a window, that of a usual sidebar."""
     return context.region.width if context.region else 300
 
 
 def narrow(context) -> bool:
-    """Whether what would stand side by side has to stand one below the other."""
+    """Return whether a row must become a column."""
     return region_width(context) < NARROW_PX * (bpy.context.preferences.system.ui_scale or 1.0)  # 0 without a window
 
 
 def draw_settings(layout, item, stage: Stage, without: tuple[str, ...] = ()) -> None:
-    """The fields of a stage's settings, in their order, folded away under its name: every one has a good default.
-
-    Parameters
-    ----------
-    layout : drawn into
-    item : the capture's, which holds the values
-    stage : of the chain
-    without : fields that stand elsewhere
-    """
+    """Draw a stage's settings under a folded header, except those of `without`, which are drawn elsewhere."""
     header, body = layout.panel(f"wildcap_{stage.name}", default_closed=True)
     header.label(text=stage.label)
-    group = getattr(item, stage.name)
     for f in fields(STAGE_KINDS[stage.name]) if body else ():
         if f.name not in without:
-            body.prop(group, f.name)
+            body.prop(getattr(item, stage.name), f.name)

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The thread that looks at a batch: who runs it and how far that is, and where its faces are. A face that is seen for
-the first time costs the reading of all its files, later a few file times. Nothing here touches Blender."""
+"""Thread that watches a batch: the machine that runs it, its progress and the state of each face.
+
+The first look at a face reads all its files, later ones compare a few file times. Nothing here touches Blender.
+"""
 
 import contextlib
 import os
@@ -20,16 +22,19 @@ from ..core.capture.json_files import is_number, read_json
 from ..core.capture.messages import Problem
 
 EVERY_S = 0.5
-"""Between two looks at who runs the batch, and how far that is."""
+"""Interval of the looks at the runner and its progress."""
 REST, LONGEST_REST_S = 10, 5.0
-"""A look at all faces is followed by a rest of so many times its length: Python runs one thread at a time, and
-Blender's own is to be held up by a tenth at most. In the longest rest an artist would begin to wonder."""
+"""Rest after a look at all faces, as a multiple of its duration: Python runs one thread at a time, and Blender's own
+may lose a tenth. The limit keeps the display current."""
 
 
 @dataclass(frozen=True)
 class BatchView:
-    """A batch as it was seen last. `states` has the faces that were looked at, by name; `runner` is the machine that
-    runs it, '' for none; `progress` is what it says of its run meanwhile; `problem` is why it cannot be used."""
+    """Known state of a batch.
+
+    `states` has the faces that were examined, by name; `runner` is the machine that runs it, '' for none; `progress`
+    comes from that run; `problem` is why the batch cannot be used.
+    """
 
     batch: Batch | None = None
     states: dict[str, FaceState] = field(default_factory=dict)
@@ -45,24 +50,25 @@ class BatchView:
         return {str(face.root): face for face in self.batch.faces} if self.batch else {}
 
     def face(self, root: str) -> BatchFace | None:
-        """The face whose capture lies in that folder."""
+        """Return the face whose capture lies in that folder."""
         return self._faces.get(root)
 
 
 class Watch(threading.Thread):
-    """Looks at a batch for as long as it is wanted; without one, for a remembered batch that is worth showing
-    (`found`). Touches nothing of Blender's."""
+    """Thread that keeps `view` of a batch current; without a batch, `found` is a remembered one worth showing.
+
+    `listed` has the capture folders of the scenes.
+    """
 
     def __init__(self, root: Path | None, memory: Path):
         super().__init__(name="wildcap-batch", daemon=True)
         self.root, self._memory = root, memory
         self.view, self.found, self.listed = BatchView(), None, frozenset()
-        # when the record was changed that was read last, and what it said
-        self._read: tuple[int, Batch | None] = 0, None
+        self._record: tuple[int, Batch | None] = 0, None  # time of the record, and its content
         self._stamps: dict[str, tuple] = {}  # face -> what its state was derived from
-        # the time of the lease's last refresh, and when that was first seen (time.monotonic)
+        # time of the lease's last refresh, and when that was first observed (time.monotonic)
         self._refreshed: tuple[int, float] = 0, 0.0
-        self._due = 0.0  # when all faces are looked at again (time.monotonic)
+        self._due = 0.0  # when all faces are examined again (time.monotonic)
         self._searched: tuple = ()
         self._ended = threading.Event()
         self.start()
@@ -79,20 +85,20 @@ class Watch(threading.Thread):
                     self._look_at(self._read_batch())
             except Problem as problem:
                 self.view = BatchView(problem=problem)
-            except Exception as error:  # nobody is above a thread
+            except Exception as error:  # an uncaught one would end the thread silently
                 self.view = BatchView(problem=unforeseen.explain(error, "looking at the batch"))
             self._ended.wait(EVERY_S)
 
     def _read_batch(self) -> Batch:
-        changed = _changed(self.root / NAME)
-        if self._read[1] is None or self._read[0] != changed:
-            self._read = changed, read_batch(self.root)
-            self._stamps.clear()  # each is asked anew: other settings may have been asked for
+        time_ns = modified_ns(self.root / NAME)
+        if self._record[1] is None or self._record[0] != time_ns:
+            self._record = time_ns, read_batch(self.root)
+            self._stamps.clear()  # the settings may differ, and so every state
             self._due = 0.0
-        return self._read[1]
+        return self._record[1]
 
     def _look_at(self, batch: Batch) -> None:
-        self._tell(batch)
+        self._update(batch)
         began = time.monotonic()
         if began < self._due:
             return
@@ -105,30 +111,28 @@ class Watch(threading.Thread):
 
     def _look_at_face(self, batch: Batch, face: BatchFace) -> None:
         stamp = _stamp(face)
-        # who holds a lock may have ended
+        # the holder of a lock may have ended
         if stamp[0] or self._stamps.get(face.name) != stamp or face.name not in self.view.states:
-            face_state = _ask(batch, face)
+            face_state = _state_of(batch, face)
             self.view = replace(self.view, states={**self.view.states, face.name: face_state})
             self._stamps[face.name] = () if face_state.state == STOPPED and face_state.group is None else stamp
-            self._tell(batch)
+            self._update(batch)
 
-    def _tell(self, batch: Batch) -> None:
-        """Who runs it and how far that is, also while a face takes long to look at."""
-        runner, names = self._ask_runner(batch.root), {face.name for face in batch.faces}
+    def _update(self, batch: Batch) -> None:
+        """Update runner and progress, also between faces that take long to examine."""
+        runner, names = self._live_runner(batch.root), {face.name for face in batch.faces}
         states = {name: each for name, each in self.view.states.items() if name in names}
         self.view = BatchView(batch, states, runner, _read_progress(batch.root) if runner else {})
 
-    def _ask_runner(self, root: Path) -> str:
-        """As `_runner`; a machine that has refreshed its lease for a whole term no more has gone, and what it left is
-        no obstacle."""
-        stamp = _changed(root / "lock")
+    def _live_runner(self, root: Path) -> str:
+        """Return the runner unless its lease was not refreshed for a whole term: then that machine is gone."""
+        stamp = modified_ns(root / "lock")
         if stamp != self._refreshed[0]:
             self._refreshed = stamp, time.monotonic()
         return _runner(root) if time.monotonic() - self._refreshed[1] <= lease.TERM_S else ""
 
     def _search(self) -> None:
-        """The newest that is being run; or else, when there is something new to compare, the newest with a capture of
-        the scenes."""
+        """Find the newest batch that is running; if there is news to compare, else the newest with a listed capture."""
         roots, listed = remembered(self._memory), self.listed
         self.found = next((root for root in roots if _runner(root)), None)
         if self.found is None and (roots, listed) != self._searched:
@@ -136,8 +140,24 @@ class Watch(threading.Thread):
             self.found = next((root for root in roots if listed & _captures_of(root)), None)
 
 
+def modified_ns(path: Path) -> int:
+    """Return the time of a file or folder in nanoseconds; 0 if there is none, or it was removed this moment."""
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return 0
+
+
+def remembered(memory: Path) -> list[Path]:
+    """Return the batches of a memory file that still exist, newest first."""
+    try:
+        return [Path(path) for path in read_json(memory) if (Path(path) / NAME).is_file()]
+    except (OSError, ValueError, TypeError):
+        return []
+
+
 def _stamp(face: BatchFace) -> tuple:
-    """What a face's state depends on, as far as one look at its folder tells."""
+    """Return what a face's state depends on, as far as file times say."""
     capture = face.capture
     watched = (
         capture.json,
@@ -149,31 +169,20 @@ def _stamp(face: BatchFace) -> tuple:
         capture.solved,
         capture.renders / state.SHEET,
     )
-    return (os.path.lexists(capture.lock), *(_changed(path) for path in watched))
+    return (os.path.lexists(capture.lock), *map(modified_ns, watched))
 
 
-def _ask(batch: Batch, face: BatchFace) -> FaceState:
-    """Where a face is; without a group where its folder does not answer, or changes under the look."""
+def _state_of(batch: Batch, face: BatchFace) -> FaceState:
+    """Return a face's state; without a group if its folder does not answer or is changing."""
     try:
         return state.derive_state(batch, face)
     except OSError as error:
-        return FaceState(
-            STOPPED,
-            None,
-            f"The capture folder {face.root} cannot be read ({error.strerror or error}).",
-            "See that its disk or server is connected.",
-        )
-
-
-def _changed(path: Path) -> int:
-    try:
-        return path.stat().st_mtime_ns
-    except OSError:
-        return 0
+        reason = f"The capture folder {face.root} cannot be read ({error.strerror or error})."
+        return FaceState(STOPPED, None, reason, "Check that its disk or server is connected.")
 
 
 def _runner(root: Path) -> str:
-    """The machine that runs a batch; '' for none."""
+    """Return the machine that runs a batch; '' for none."""
     try:
         holder = lease.present_holder(root / "lock")
     except Problem:  # something else is in the lock's place: running it says so
@@ -182,17 +191,17 @@ def _runner(root: Path) -> str:
 
 
 def _read_progress(root: Path) -> dict:
-    """progress.json, as far as it makes sense; {} for none."""
+    """Return progress.json; {} if it is missing or implausible."""
     try:
-        told = read_json(root / local.PROGRESS)
+        progress = read_json(root / local.PROGRESS)
         working = {
             str(name): {"stage": str(each["stage"]), "share": each["share"]}
-            for name, each in told["working"].items()
+            for name, each in progress["working"].items()
             if is_number(each["share"])
         }
-        ended, of, left = told["ended"], told["of"], told["left_s"]
-        sound = is_number(ended, 0) and is_number(of, 0) and (left is None or is_number(left, 0))
-        return {"ended": ended, "of": of, "left_s": left, "working": working} if sound else {}
+        ended, of, left = progress["ended"], progress["of"], progress["left_s"]
+        plausible = is_number(ended, 0) and is_number(of, 0) and (left is None or is_number(left, 0))
+        return {"ended": ended, "of": of, "left_s": left, "working": working} if plausible else {}
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return {}
 
@@ -202,11 +211,3 @@ def _captures_of(root: Path) -> set[str]:
         return {str(face.root) for face in read_batch(root).faces}
     except Problem:
         return set()
-
-
-def remembered(memory: Path) -> list[Path]:
-    """The newest first."""
-    try:
-        return [Path(path) for path in read_json(memory) if (Path(path) / NAME).is_file()]
-    except (OSError, ValueError, TypeError):
-        return []

@@ -1,18 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The batch that the tab shows: many faces that a process of its own, or a farm, works on. It goes on when Blender
-closes, and is found again.
+"""Batch shown in the tab: many faces processed outside Blender, by another process or a farm.
 
-What is done stands in the captures; a thread looks there, for a face that it sees for the first time costs the reading
-of all its files, and `poll` takes in what it saw. Panels only read that. Which batch it is, the extension's user folder
-remembers: no .blend has to. Run-time state only.
+Progress is stored in the captures. A thread reads them, `poll` takes over what it found, panels read only that. The
+extension's user folder remembers the batches, so that Blender finds them again after a restart. Run-time state only.
 """
 
 import contextlib
 from collections.abc import Iterable
 from pathlib import Path
 
-import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.batch import gate
@@ -21,42 +18,45 @@ from ..core.batch.record import BatchFace
 from ..core.batch.state import DONE, STOPPED, TO_DO, WAITING, WORKING, FaceState
 from ..core.capture.files import write_json
 from ..core.capture.messages import Problem
-from . import captures, extension
+from . import captures
 from .batch_watch import BatchView, Watch, remembered
+from .extension import user_file
 
 MOST_ROWS = 10
-"""Batches that are remembered."""
+"""Number of batches to remember."""
+MEMORY = "batches.json"
 ICONS = {DONE: 'CHECKMARK', TO_DO: 'RADIOBUT_OFF', WORKING: 'PLAY', WAITING: 'BRUSH_DATA', STOPPED: 'ERROR'}
 _watch: Watch | None = None
 _shown: tuple = ()
-_accepted: set[str] = set()  # captures whose mask was accepted since they were last looked at
+_accepted: set[str] = set()  # captures whose mask was accepted since their last look
 
 
 def current() -> Path | None:
-    """The folder of the batch that is open."""
+    """Return the folder of the open batch."""
     return _watch.root if _watch is not None else None
 
 
 def view() -> BatchView:
-    """As it was seen last; empty before."""
+    """Return what is known of the open batch; empty before the first look."""
     return _watch.view if current() else BatchView()
 
 
 def choose(root: Path) -> None:
-    """Makes a batch the open one, and remembers it."""
-    _remember([root, *(other for other in remembered(_memory()) if other != root)])
+    """Open a batch, and remember it."""
+    memory = user_file(MEMORY)
+    _remember([root, *(other for other in remembered(memory) if other != root)])
     if current() != root:
         _replace_watch(root)
 
 
 def close() -> None:
-    """No batch is open; the one that was is not found again by itself."""
-    _remember(other for other in remembered(_memory()) if other != current())
+    """Close the open batch, and forget it."""
+    _remember(other for other in remembered(user_file(MEMORY)) if other != current())
     _replace_watch(None)
 
 
 def state_of(root: str) -> FaceState | None:
-    """Of a capture that belongs to the batch."""
+    """Return the state of a capture that belongs to the batch."""
     face = view().face(root)
     face_state = view().states.get(face.name) if face else None
     if face_state is not None and face_state.state == WAITING and root in _accepted:
@@ -65,7 +65,7 @@ def state_of(root: str) -> FaceState | None:
 
 
 def works_on(root: str) -> bool:
-    """Whether the batch has a capture in hand, or somebody else has one of its."""
+    """Return whether the batch, or somebody else, is working on one of its captures."""
     face, face_state = view().face(root), state_of(root)
     return face is not None and (
         face.name in view().progress.get("working", {}) or face_state is not None and face_state.state == WORKING
@@ -73,54 +73,49 @@ def works_on(root: str) -> bool:
 
 
 def waiting() -> list[BatchFace]:
-    """The faces whose masks wait to be looked at, in the batch's order."""
-    known = view()
-    return (
-        [face for face in known.batch.faces if (status := state_of(str(face.root))) and status.state == WAITING]
-        if known.batch
-        else []
-    )
+    """Return the faces whose masks wait for approval, in the batch's order."""
+    return [face for face, face_state in _states() if face_state.state == WAITING]
 
 
 def ready() -> int:
-    """How many faces are to be solved with a mask that was looked at."""
-    face_states = [state_of(str(face.root)) for face in view().batch.faces] if view().batch else []
-    return sum(
-        each is not None and each.state == TO_DO and each.group is not None and each.group.name == GATE
-        for each in face_states
-    )
+    """Count the faces to solve whose masks were approved."""
+    return sum(each.state == TO_DO and each.group is not None and each.group.name == GATE for _, each in _states())
 
 
 def accept(face: BatchFace) -> None:
-    """The mask is good as it is. Raises Problem where there is none."""
+    """Approve a face's mask as it is. Raises Problem if there is none."""
     gate.accept_mask(face.capture)
     _accepted.add(str(face.root))
 
 
 def poll() -> bool:
-    """Takes in what was seen since the last call; whether the tab shows something else now. Tests call it in place of
-    the timer."""
+    """Take over what the thread found, and return whether the tab changed. Tests call it in place of the timer."""
     global _shown
     if _watch is None:
         _replace_watch(None)
     _watch.listed = frozenset(map(captures.root, captures.listed()))
     if _watch.root is None and _watch.found is not None:
         choose(_watch.found)
-    known = view()
+    batch_view = view()
     for root in list(_accepted):
-        face = known.face(root)
-        if face is None or face.name in known.states and known.states[face.name].state != WAITING:
+        face = batch_view.face(root)
+        if face is None or face.name in batch_view.states and batch_view.states[face.name].state != WAITING:
             _accepted.discard(root)
-    before, _shown = (
-        _shown,
-        (current(), known.states, known.runner, bool(known.problem), line(known), share(known), frozenset(_accepted)),
+    before = _shown
+    _shown = (
+        current(),
+        batch_view.states,
+        batch_view.runner,
+        bool(batch_view.problem),
+        line(batch_view),
+        share(batch_view),
+        frozenset(_accepted),
     )
     return before != _shown
 
 
 def line(view: BatchView) -> str:
-    """What is being done, and how long all of it takes: 'Anna: Cameras 40 %, about 20 min left'; '' where nothing is
-    told."""
+    """Describe the current work: 'Anna: Cameras 40 %, about 20 min left'; '' if unknown."""
     words = [
         iface_("{}: {} {}").format(name, iface_(each["stage"]), f"{each['share']:.0%}")
         for name, each in view.progress.get("working", {}).items()
@@ -131,8 +126,13 @@ def line(view: BatchView) -> str:
 
 
 def share(view: BatchView) -> float:
-    """The part of a run's faces that have ended, in [0, 1]."""
+    """Return the share of the run's faces that have ended, in [0, 1]."""
     return min(1.0, view.progress["ended"] / view.progress["of"]) if view.progress.get("of") else 0.0
+
+
+def _states() -> list[tuple[BatchFace, FaceState]]:
+    faces = view().batch.faces if view().batch else ()
+    return [(face, face_state) for face in faces if (face_state := state_of(str(face.root)))]
 
 
 def _replace_watch(root: Path | None) -> None:
@@ -140,17 +140,13 @@ def _replace_watch(root: Path | None) -> None:
     if _watch is not None:
         _watch.end()
     _accepted.clear()
-    _watch = Watch(root, _memory())
-
-
-def _memory() -> Path:
-    return Path(bpy.utils.extension_path_user(extension.NAME, create=True)) / "batches.json"
+    _watch = Watch(root, user_file(MEMORY))
 
 
 def _remember(roots: Iterable[Path]) -> None:
-    # a folder that cannot be written: it is found no more when Blender was closed
+    # without a writable folder the batch is not found after a restart
     with contextlib.suppress(Problem, OSError, ValueError):
-        write_json(_memory(), [str(root) for root in roots][:MOST_ROWS])
+        write_json(user_file(MEMORY), [str(root) for root in roots][:MOST_ROWS])
 
 
 def register():
@@ -158,7 +154,7 @@ def register():
 
 
 def unregister():
-    """The batch goes on: only the looking ends."""
+    """Stop watching; the batch itself goes on."""
     global _watch, _shown
     if _watch is not None:
         _watch.end()

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colour spaces and views by what they are for, as a studio's own OCIO configuration need not have Blender's names.
+"""Colour spaces and views chosen by purpose: a studio's OCIO configuration need not have Blender's names.
 
-Data (masks, normals, specular) goes by OCIO's role `data`; pictures by the names that sRGB for textures has in the
-usual configurations, else by the role `default_byte`, which a configuration gives to pictures of 8 bits.
+Data (masks, normals, specular) uses OCIO's role `data`; pictures use the usual names of sRGB for textures, else the
+role `default_byte`, which a configuration gives to pictures of 8 bits.
 
-Numbers of a colour are linear light of sRGB's primaries (Rec.709) here and in the capture; the scene's working space,
-in which Blender takes those of nodes, lamps and attributes, may have others (ACEScg, Rec.2020).
+Colours as numbers are linear with sRGB's primaries (Rec.709) here and in the capture; the scene's working space, in
+which Blender expects those of nodes, lamps and attributes, may have others (ACEScg, Rec.2020).
 """
 
 import bpy
@@ -22,23 +22,23 @@ SRGB = (
     "srgb_tx",
     "sRGB Encoded Rec.709 (sRGB)",
 )
-"""Of Blender, ACES 1.3 and newer, ACES 1.0 to 1.2, the same by its family, their short forms, and the Color Interop
-Forum's (2024)."""
+"""Names in Blender, ACES 1.3 and newer, ACES 1.0 to 1.2, the same by its family, their short forms, and the Color
+Interop Forum's (2024)."""
 VIEWS = ("Standard", "Un-tone-mapped", "Raw")
-"""Views that show colours as they are."""
+"""Views that show colours unchanged."""
 ROUNDED = 1e-4
-"""What a configuration's own matrices, of some five digits, are off by"""
+"""Error of a configuration's own matrices, which have some five digits."""
 
 
 def as_srgb(image: bpy.types.Image) -> None:
-    """Reads a picture as sRGB for textures."""
+    """Read a picture as sRGB for textures."""
     if image.colorspace_settings.name not in SRGB:
         _choose(image.colorspace_settings, "name", (*SRGB, of_pictures()))
 
 
 def as_data(image: bpy.types.Image) -> None:
-    """Reads numbers as they are."""
-    if not image.colorspace_settings.is_data:  # setting it has Blender read the file anew
+    """Read a picture as numbers without a colour space."""
+    if not image.colorspace_settings.is_data:  # setting it makes Blender reload the file
         image.colorspace_settings.is_data = True
 
 
@@ -53,30 +53,30 @@ def linear_to_srgb(linear: np.ndarray) -> np.ndarray:
 
 
 def to_working(linear: np.ndarray | tuple) -> np.ndarray:
-    """Linear colours [..., 3] of sRGB's primaries in the scene's working space."""
+    """Convert linear colours [..., 3] with sRGB's primaries to the scene's working space."""
     return np.asarray(linear) @ _towards_working()
 
 
 def from_working(linear: np.ndarray | tuple) -> np.ndarray:
-    """Colours [..., 3] in the scene's working space as linear ones of sRGB's primaries."""
+    """Convert colours [..., 3] in the scene's working space to linear ones with sRGB's primaries."""
     return np.asarray(linear) @ np.linalg.inv(_towards_working())
 
 
 def _towards_working() -> np.ndarray:
-    """[3, 3], for rows; exactly the identity where the working space has sRGB's primaries."""
+    """Return the matrix [3, 3] for rows; exactly the identity if the working space has sRGB's primaries."""
     matrix = np.array([Color(axis).from_rec709_linear_to_scene_linear()[:] for axis in np.eye(3)])
     return np.eye(3) if np.abs(matrix - np.eye(3)).max() < ROUNDED else matrix
 
 
 def show_by(scene: bpy.types.Scene, view: str) -> None:
-    """Has a scene shown by a view transform; where the configuration has none of that name, as it is."""
+    """Show a scene by a view transform; if the configuration has none of that name, unchanged."""
     _choose(scene.view_settings, "view_transform", (view, *VIEWS))
     _choose(scene.view_settings, "look", ("None",))
     scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
 
 
 def of_pictures() -> str:
-    """The space that the configuration gives to a picture of 8 bits."""
+    """Return the configuration's space for pictures of 8 bits."""
     image = bpy.data.images.new("WildCap Colour Space", 1, 1)
     try:
         return image.colorspace_settings.name
@@ -85,36 +85,31 @@ def of_pictures() -> str:
 
 
 def missing(image: bpy.types.Image) -> str:
-    """What the artist is to know about how a picture is read; '' where it is read as sRGB."""
+    """Return a warning if a picture is not read as sRGB; else ''."""
     name = image.colorspace_settings.name
-    return (
-        ""
-        if name in SRGB
-        else f"This OCIO configuration has no sRGB by a known name: pictures are read as {name}, its space for 8 bits."
-    )
+    if name in SRGB:
+        return ""
+    return f"This OCIO configuration has no sRGB by a known name: pictures are read as {name}, its space for 8 bits."
 
 
 def missing_view(scene: bpy.types.Scene) -> str:
-    """What the artist is to know about how a render will look; '' where it looks as it is."""
+    """Return a warning if no view shows a render unchanged; else ''."""
     settings = scene.view_settings
     now, look = settings.view_transform, settings.look  # Blender drops a look that another view does not have
     try:
-        return (
-            ""
-            if _choose(settings, "view_transform", VIEWS)
-            else f"This OCIO configuration has no view without a look: the render is shown by {now}."
-        )
+        if _choose(settings, "view_transform", VIEWS):
+            return ""
+        return f"This OCIO configuration has no view without a look: the render is shown by {now}."
     finally:
-        settings.view_transform = now
-        settings.look = look
+        settings.view_transform, settings.look = now, look
 
 
-def _choose(settings, name: str, names: tuple[str, ...]) -> str | None:
-    """Sets the first of the names that there is; None where there is none."""
-    for value in names:
+def _choose(settings, name: str, values: tuple[str, ...]) -> str | None:
+    """Set a property to the first value that exists, and return that."""
+    for value in values:
         try:
             setattr(settings, name, value)
             return value
-        except TypeError:  # Blender's word for a name that is not in the enumeration
+        except TypeError:  # not in the enumeration
             continue
     return None

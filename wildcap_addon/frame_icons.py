@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames as icons, of their own files as they are: no data-block is made behind the artist's back."""
+"""Picture files as icons, without data-blocks."""
 
 from pathlib import Path
 
@@ -8,19 +8,22 @@ import bpy
 import bpy.utils.previews
 
 _icons: bpy.utils.previews.ImagePreviewCollection | None = None
+_times: dict[str, int] = {}  # picture -> its modification time, ns
 
 
 def load(path: Path) -> int:
-    """The icon of a frame as it is on disk now; 0 where it is missing. Its picture is read when Blender first draws
-    it."""
+    """Return the icon of a picture as it is on disk now; 0 if it is missing. Blender reads it when it draws it."""
     global _icons
     if not path.is_file():
         return 0
     if _icons is None:
         _icons = bpy.utils.previews.new()
-    key = str(path)
-    _icons.pop(key, None)
-    return _icons.load(key, key, 'IMAGE', force_reload=True).icon_id
+    key, time = str(path), path.stat().st_mtime_ns
+    if _times.get(key) != time:
+        _icons.pop(key, None)  # or load refuses; the icon keeps its number
+        _icons.load(key, key, 'IMAGE', force_reload=True)
+        _times[key] = time
+    return _icons[key].icon_id
 
 
 def register():
@@ -32,3 +35,4 @@ def unregister():
     if _icons is not None:
         bpy.utils.previews.remove(_icons)
     _icons = None
+    _times.clear()

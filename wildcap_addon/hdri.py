@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light from a picture of the surroundings (HDRI): one of Blender's own worlds, one installed in the preferences'
-lights, or a file."""
+"""Light from a picture of the surroundings (HDRI): a world of Blender's, one of the preferences' lights, or a file."""
 
 from dataclasses import dataclass
 from math import tau
@@ -17,31 +16,30 @@ _items: list[tuple[str, str, str, int, int]] = []  # Blender keeps no reference 
 
 @dataclass(frozen=True)
 class Hdri:
-    """An equirectangular picture of the surroundings, times `strength`."""
+    """Equirectangular picture of the surroundings, times `strength`."""
 
     path: Path
     strength: float = 1.0
 
 
 def items(self, context):
-    """The worlds that Blender knows, its own eight (CC0) and the artist's, for an EnumProperty."""
-    # a file keeps the number: by the place in the list it would mean another world in another Blender
+    """Return the worlds that Blender knows, its own eight (CC0) and the artist's, for an EnumProperty."""
+    # a file stores the number: the place in the list would mean another world in another Blender
     choices = [
         (light.name, Path(light.name).stem.replace("_", " ").title(), "", 0, crc32(light.name.encode()) & 0x7FFFFFFF)
         for light in _worlds()
     ]
-    _items[:] = choices or [('NONE', "None", "This Blender came without any", 0, 0)]
+    _items[:] = choices or [('NONE', "None", "This Blender has none", 0, 0)]
     return _items
 
 
 def light(props) -> str | Hdri:
-    """What the scene's settings ask for: a preset's name, or a picture."""
+    """Return the light of the scene's settings: a preset's name, or a picture."""
     return chosen_hdri(props) if props.light == 'hdri' else props.light
 
 
 def named(name: str) -> Hdri:
-    """One of the worlds that Blender knows, by its file's name with or without the suffix. Raises Problem where there
-    is none."""
+    """Return a world by its file's name with or without the suffix. Raises Problem if there is none."""
     for world in _worlds():
         if name in (world.name, Path(world.name).stem):
             return Hdri(Path(world.path))
@@ -52,7 +50,7 @@ def named(name: str) -> Hdri:
 
 
 def chosen_hdri(props) -> Hdri:
-    """What the scene's settings ask for. Raises Problem where there is no such picture."""
+    """Return the picture of the scene's settings. Raises Problem if there is none."""
     path = (
         Path(bpy.path.abspath(props.hdri_file))
         if props.hdri_file
@@ -68,7 +66,7 @@ def chosen_hdri(props) -> Hdri:
 
 
 def light_with(world: bpy.types.World, hdri: Hdri, turned: float) -> None:
-    """Makes the picture the world's background, turned about +Z by `turned` radians, counter-clockwise from above."""
+    """Make the picture the world's background, turned about +Z by `turned` radians, counter-clockwise from above."""
     nodes, links = world.node_tree.nodes, world.node_tree.links
     background = next(n for n in nodes if n.type == 'BACKGROUND')
     coordinates, mapping, picture = (
@@ -76,7 +74,7 @@ def light_with(world: bpy.types.World, hdri: Hdri, turned: float) -> None:
     )
     for node, x in ((coordinates, -900), (mapping, -700), (picture, -450)):
         node.location = (x, 0)
-    # Turning what is looked up one way turns the surroundings the other way.
+    # Turning the coordinates one way turns the surroundings the other way.
     mapping.inputs["Rotation"].default_value = (0, 0, -(turned % tau))
     picture.image = bpy.data.images.load(str(hdri.path), check_existing=True)
     background.inputs["Strength"].default_value = hdri.strength

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The head object of a capture: head.obj brought into the scene with its UVs and its texture; again in place when it
-changed."""
+"""Head object of a capture: head.obj in the scene with its UVs and its texture, updated in place."""
 
 from pathlib import Path
 
@@ -13,60 +12,61 @@ from ..core.capture.messages import Problem
 from . import captures, colours, data_blocks, node_trees
 
 PREVIEW = "WildCap Preview"
-"""Name of the image node by which a running solve is shown on the head."""
+"""Name of the image node that shows a running solve on the head."""
 
 OUTER = "wildcap_outer_polygons"
-"""Custom property of a mesh that has more than the head's skin: how many polygons that has. They come first."""
+"""Custom property of a mesh that has more than the head's skin: the number of the skin's polygons, which come first."""
 HAIR_UVS = "WildCap Hair"
-"""UV map of such a mesh in which those of the skin are alone, as hair that is rooted by them needs it: sockets continue
-the lids' maps."""
+"""UV map of such a mesh with the skin alone, for the roots of hair: sockets continue the lids' maps."""
 
 TEXTURE_KEY = "wildcap_texture"
 """Custom property of a material that shows the texture until the skin is assembled: its fingerprint as it was made."""
 
 FOLLOWERS = []
-"""Functions (head object, new mesh) of rooms that made more of a head's mesh: whether it now has the new mesh's shape,
-which is then not needed."""
+"""Functions (head object, new mesh) -> bool of rooms that extend a head's mesh; True if that took the new shape, and
+the new mesh is not needed."""
 
 COMPLETERS = []
-"""Functions (head object, capture) of rooms that add to a head whose skin is assembled: the eyes that it was filmed
-with. What one returns is to be told to the artist."""
+"""Functions (head object, capture) -> str of rooms that add to a head whose skin is assembled, such as the filmed eyes;
+they return a message for the artist, or ''."""
 
 
 def complete(obj, capture: Capture) -> str:
-    """Returns what is to be told of it, '' for nothing."""
+    """Run all completers, and return their messages."""
     return " ".join(filter(None, [add(obj, capture) for add in COMPLETERS]))
 
 
 def bring_in(context, item) -> bpy.types.Object:
-    """The capture's head in the scene, active and selected. An existing head keeps its place and materials and gets the
-    new mesh."""
+    """Return the capture's head in the scene, active and selected.
+
+    An existing head keeps its place and materials and gets the new mesh.
+    """
     capture = captures.folder(item)
     if not capture.head.is_file():
         raise Problem("This capture has no head yet.", "Click Reconstruct first.")
     head = captures.head(context, item)
     if head is not None:
         captures.require_shown(context, head)
-    mesh = read_mesh(context, capture)
+    mesh = read_mesh_file(context, capture.head)
     if head is None:
         head = bpy.data.objects.new(item.name, mesh)
         context.collection.objects.link(head)
         item.head = head
     else:
-        mesh = _in_place(head, mesh)
+        mesh = _replace_mesh(head, mesh)
     mesh.name = item.name
     head[captures.HEAD_KEY] = item.path
     head["wildcap_head_time"] = capture.head.stat().st_mtime
     _show_texture(head, capture)
-    context.view_layer.update()  # what was linked and removed above is known to it only now
+    context.view_layer.update()  # it does not yet know the objects linked and removed above
     for other in list(context.view_layer.objects):
         other.select_set(other == head)
     context.view_layer.objects.active = head
     return head
 
 
-def _in_place(head, mesh) -> bpy.types.Mesh:
-    """The new mesh on an existing head, with its materials; or the mesh it has, where that has followed."""
+def _replace_mesh(head, mesh) -> bpy.types.Mesh:
+    """Return the mesh of an existing head: the new one with the old materials, or its own in the new shape."""
     try:
         followed = any(follow(head, mesh) for follow in FOLLOWERS)
     except Problem:
@@ -80,8 +80,10 @@ def _in_place(head, mesh) -> bpy.types.Mesh:
 
 
 def _take_shape(kept_mesh: bpy.types.Mesh, new_mesh: bpy.types.Mesh) -> bool:
-    """Whether `kept_mesh` has the topology of `new_mesh` and took its coordinates: weights, UV maps, attributes and
-    shape keys that the artist made on it stay."""
+    """Give a mesh the coordinates of another one, and return whether their topology is the same.
+
+    The artist's weights, UV maps, attributes and shape keys are kept.
+    """
     corners = [data_blocks.read_field(mesh.loops, "vertex_index", kind=np.int32) for mesh in (kept_mesh, new_mesh)]
     if (
         len(kept_mesh.vertices) != len(new_mesh.vertices)
@@ -91,17 +93,16 @@ def _take_shape(kept_mesh: bpy.types.Mesh, new_mesh: bpy.types.Mesh) -> bool:
         return False
     places = data_blocks.read_field(new_mesh.vertices, "co", 3)
     keys = kept_mesh.shape_keys.key_blocks if kept_mesh.shape_keys else ()
-    moved = places - data_blocks.read_field(keys[0].data if keys else kept_mesh.vertices, "co", 3)
+    displacements = places - data_blocks.read_field(keys[0].data if keys else kept_mesh.vertices, "co", 3)
     for key in keys:
-        key.data.foreach_set("co", (data_blocks.read_field(key.data, "co", 3) + moved).ravel())
+        key.data.foreach_set("co", (data_blocks.read_field(key.data, "co", 3) + displacements).ravel())
     kept_mesh.vertices.foreach_set("co", places.ravel())
     kept_mesh.update()
     return True
 
 
 def look_at(context, head: bpy.types.Object) -> None:
-    """Turns the window's 3D views to the face, alone (Local View): a start-up cube would swallow a head of real
-    size."""
+    """Turn the window's 3D views to the face, in Local View: a start-up cube would swallow a head of real size."""
     if bpy.app.background or context.window is None:
         return
     for area in context.window.screen.areas:
@@ -116,13 +117,8 @@ def look_at(context, head: bpy.types.Object) -> None:
             area.spaces.active.shading.color_type = 'TEXTURE'
 
 
-def read_mesh(context, capture: Capture) -> bpy.types.Mesh:
-    """head.obj as mesh data: metres, +Z up, its one UV map named UVMap, smooth."""
-    return read_mesh_file(context, capture.head)
-
-
 def read_mesh_file(context, path: Path) -> bpy.types.Mesh:
-    """As `read_mesh`, of any of a capture's OBJ files."""
+    """Return an OBJ of a capture as mesh data: metres, +Z up, its one UV map named UVMap, smooth."""
     before = set(context.scene.objects)
     bpy.ops.wm.obj_import(
         filepath=str(path), forward_axis='Y', up_axis='Z', import_vertex_groups=False, validate_meshes=False
@@ -144,22 +140,17 @@ def read_mesh_file(context, path: Path) -> bpy.types.Mesh:
 
 
 def load_image(path, data: bool = False) -> bpy.types.Image:
-    """The image of a file, read anew if Blender has it already: a picture in sRGB, or data. One of that file that was
-    painted on, or is packed in the .blend as another one than the file is now, stays as it is, and stays in the
-    .blend."""
-    known = [
-        image
-        for image in bpy.data.images
-        if image.source == 'FILE'
-        and image.filepath
-        and Path(bpy.path.abspath(image.filepath, library=image.library)) == Path(path)
-    ]
-    touched = [
-        image for image in known if image.is_dirty or image.packed_file is not None and not _is_packed(image, path)
-    ]
-    for image in touched:
+    """Return the image of a file as it is now, reloaded if Blender has it already: a picture in sRGB, or data.
+
+    An image of that file that was painted on, or is packed in the .blend with other content, is left alone and kept.
+    """
+    path = Path(path)
+    images = [image for image in bpy.data.images if image.source == 'FILE' and image.filepath]
+    of_file = [i for i in images if Path(bpy.path.abspath(i.filepath, library=i.library)) == path]
+    altered = [i for i in of_file if i.is_dirty or i.packed_file is not None and not _is_packed(i, path)]
+    for image in altered:
         image.use_fake_user = True
-    image = next((image for image in known if image not in touched and image.library is None), None)
+    image = next((i for i in of_file if i not in altered and i.library is None), None)
     if image is None:
         image = bpy.data.images.load(str(path))
     if image.packed_file is None:
@@ -168,14 +159,14 @@ def load_image(path, data: bool = False) -> bpy.types.Image:
     return image
 
 
-def _is_packed(image: bpy.types.Image, path) -> bool:
-    """Whether the .blend holds the very file, as it does where Blender packs resources by itself."""
-    packed, path = image.packed_file, Path(path)
+def _is_packed(image: bpy.types.Image, path: Path) -> bool:
+    """Return whether the .blend holds exactly this file, as when Blender packs resources automatically."""
+    packed = image.packed_file
     return packed.size == path.stat().st_size and bytes(packed.data) == path.read_bytes()
 
 
 def _show_texture(head, capture: Capture) -> None:
-    """A head without a material gets one that shows the texture, until Assemble Material builds the skin there."""
+    """Give a head without a material one that shows the texture, until Assemble Material builds the skin there."""
     if not capture.texture_png.is_file():
         return
     image = load_image(capture.texture_png)
@@ -194,6 +185,6 @@ def _show_texture(head, capture: Capture) -> None:
     nodes.active = node
     material[TEXTURE_KEY] = node_trees.fingerprint(material, PREVIEW)
     if head.data.materials:
-        head.data.materials[0] = material  # its slot was there, and empty
+        head.data.materials[0] = material  # an empty slot
     else:
         head.data.materials.append(material)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""New results of the active capture come into the scene when nobody is in the middle of a move."""
+"""New results of the active capture, brought into the scene between the artist's own operations."""
 
 import contextlib
 from collections.abc import Callable
@@ -10,34 +10,34 @@ import bpy
 
 from . import captures, status
 
+HEAD_GOALS = ("reconstruct", "make", "solve")
+"""Goals of jobs after which a head that is missing from the scene is brought in."""
+
 
 @dataclass(frozen=True)
 class Results:
-    """take(context, list item) is called in Object Mode when nobody is in the middle of a move, for as long as
-    waits(its folder) says that something waits."""
+    """Results of a room: take(context, list item) is called in Object Mode while waits(capture folder) is true."""
 
     take: Callable
     waits: Callable[[str], bool]
 
 
 on_results: list[Results] = []
-"""What rooms do with new results of the active capture."""
+"""Rooms add theirs as they register."""
 
 
 def waits() -> bool:
-    """Whether a room has something of the active capture to bring in."""
+    """Return whether a room has something of the active capture to bring in."""
     root = captures.root(captures.active(bpy.context))
     return any(results.waits(root) for results in on_results)
 
 
-HEAD_GOALS = ("reconstruct", "make", "solve")
-"""Goals of jobs after which a head that is not in the scene comes in."""
-
-
 def bring_in(ended: dict[str, str]) -> None:
-    """What is new comes in at once if the artist is in Object Mode and not in the middle of a move: what rooms do with
-    results, and a head whose job has ended, of the active capture. Otherwise it waits. ended: capture folder -> goal of
-    the jobs that have."""
+    """Bring in results of the active capture, and its head if its job has ended.
+
+    In another mode or during a modal operation, nothing happens until a later call. `ended` maps the capture folders of
+    jobs that have ended to their goals.
+    """
     window = next(iter(bpy.context.window_manager.windows), None)
     if window is None or window.modal_operators:
         return
@@ -49,7 +49,7 @@ def bring_in(ended: dict[str, str]) -> None:
             return
         for results in on_results:
             results.take(bpy.context, item)
-        made = ended.get(captures.root(item)) in HEAD_GOALS
-        if made and captures.head(bpy.context, item) is None and captures.folder(item).head.is_file():
-            with contextlib.suppress(RuntimeError):  # the tab shows the problem of the click
+        needs_head = ended.get(captures.root(item)) in HEAD_GOALS
+        if needs_head and captures.head(bpy.context, item) is None and captures.folder(item).head.is_file():
+            with contextlib.suppress(RuntimeError):  # the operator has shown the problem in the tab
                 bpy.ops.wildcap.bring_in_head('EXEC_DEFAULT', True)

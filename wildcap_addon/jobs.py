@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The running jobs, one per capture, and the solver's installation: started by an operator, polled by a timer, stopped
-when Blender closes.
+"""Running jobs, one per capture, and the solver's installation: started by operators, polled by a timer.
 
-One worker runs at a time, for each takes all cores; jobs of other captures wait in line. Run-time state only, nothing
-of it reaches the .blend. A job belongs to its capture: opening another .blend, a new scene or an undo past its start
-changes nothing; disabling the add-on or closing Blender ends it, and what was finished is kept.
+One worker runs at a time, as each uses all cores; jobs of other captures wait in line. Run-time state only. A job
+belongs to its capture: another .blend, a new scene or an undo past its start do not affect it; disabling the add-on or
+closing Blender ends it, and finished stages are kept.
 """
 
 from collections.abc import Callable
@@ -15,7 +14,7 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ..core.capture import messages, stages, unforeseen
+from ..core.capture import messages, stages
 from ..core.capture.capture import Capture
 from ..core.capture.messages import Problem
 from ..core.settings.settings import Settings
@@ -31,47 +30,45 @@ ROOT = Path(__file__).resolve().parent.parent
 
 @dataclass
 class Job:
-    """A worker at a capture, and the last thing it said. `previews` counts the preview pictures so far."""
+    """Worker at a capture, and its last messages."""
 
-    # 'make', 'reconstruct', 'solve', 'install', 'test', or 'ask' for what is found out or tidied up in seconds
+    # 'make', 'reconstruct', 'solve', 'tool', 'deliver', 'install', 'test', or 'ask' for what takes seconds
     goal: str
     worker: Worker | BackgroundTask
-    then: Callable[[], None] | None = None  # called when it ended well
-    ended: Callable[[], None] | None = None  # called before that, however it ended
+    then: Callable[[], None] | None = None  # called after success
+    ended: Callable[[], None] | None = None  # called before that, after any end
     well: bool = False
-    # called with the capture's folder when a preview is new, and when the job has ended
+    # called with the capture's folder after each new preview, and after the end
     on_preview: Callable[[str], None] | None = None
-    # called with the name of each stage that is done, or was done before
+    # called with the name of each stage that is done or was already
     on_stage: Callable[[str], object] | None = None
-    planned: tuple[str, ...] = ()  # the stages that it goes through
+    planned: tuple[str, ...] = ()  # its stages
     settings: Settings | None = None
     waiting: bool = False  # in line behind another capture's job
     figures: dict = field(default_factory=dict)  # of the stage that ended last
     progress: messages.Progress | None = None
     stage: str = ""
-    previews: int = 0
+    previews: int = 0  # number of preview pictures so far
     log: list[str] = field(default_factory=list)
 
 
 before_start: list[Callable[[], None]] = []
-"""What rooms do before a worker reads a capture: the mask that is being painted is saved. May raise Problem, and then
-nothing starts."""
+"""Functions of rooms to call before a worker reads a capture, such as saving a mask; a Problem prevents the start."""
 _jobs: dict[str, Job] = {}  # capture folder -> its job; '' -> the installation
 
 
 def of(root: str) -> Job | None:
-    """The capture's running job."""
+    """Return the capture's job."""
     return _jobs.get(root)
 
 
 def elsewhere(root: str) -> list[tuple[str, Job]]:
-    """The jobs of other captures than this one, which may be in another scene or .blend: (capture folder, job)."""
+    """Return (capture folder, job) of other captures, which may be in another scene or .blend."""
     return [(other, job) for other, job in _jobs.items() if other not in (root, "")]
 
 
 def can_start(operator, context) -> bool:
-    """Whether there is a capture that no job and no batch works on; says in the tooltip of a greyed-out button why
-    not."""
+    """Return whether there is a capture without a job; otherwise the disabled button explains why. For `poll`."""
     root = captures.root(captures.active(context))
     return (
         operator.with_capture(context)
@@ -91,29 +88,16 @@ def start(
     last: str | None = None,
     then: Callable[[], None] | None = None,
     on_stage: Callable[[str], object] | None = None,
-    **shared,
+    **once,
 ) -> Job:
-    """Starts stages at a capture. Raises Problem when it cannot.
+    """Start stages at a capture: from `first` (None: the first that is not fresh) to `last` (None: the last one).
 
-    Parameters
-    ----------
-    item : the capture's
-    goal, then, on_stage : as Job has them
-    first, last : the stages to begin with (None: what is not fresh) and to end with (None: the last)
-    shared : settings for this once
+    `once` holds settings for this job alone. Raises Problem if it cannot start.
     """
-    capture = captures.folder(item)
-    job = _launch(
-        item,
-        goal,
-        capture,
-        then,
-        lambda: write_job(capture, first=first, last=last, settings={**properties.job_settings(item), **shared}),
-    )
+    job = _launch(item, goal, captures.folder(item), then, once, first=first, last=last)
     job.on_stage = on_stage
-    job.planned = stages.NAMES[
-        stages.NAMES.index(first or stages.NAMES[0]) : stages.NAMES.index(last or stages.NAMES[-1]) + 1
-    ]
+    names = stages.NAMES
+    job.planned = names[names.index(first or names[0]) : names.index(last or names[-1]) + 1]
     return job
 
 
@@ -125,59 +109,34 @@ def start_tool(
     then: Callable[[], None] | None = None,
     ended: Callable[[], None] | None = None,
     at: Capture | None = None,
-    **shared,
+    **once,
 ) -> Job:
-    """Starts one of core.capture.stages.TOOLS at a capture. Raises Problem when it cannot.
-
-    Parameters
-    ----------
-    item : the capture's
-    tool : its name
-    goal, then, ended : as Job has them
-    at : a capture that stands in for this one
-    shared : settings for this once
-    """
-    capture = at or captures.folder(item)
-    job = _launch(
-        item,
-        goal,
-        capture,
-        then,
-        lambda: write_job(capture, tool=tool, settings={**properties.job_settings(item), **shared}),
-    )
+    """Start one of core.capture.stages.TOOLS at a capture, or at `at` in its place; otherwise like `start`."""
+    job = _launch(item, goal, at or captures.folder(item), then, once, tool=tool)
     job.ended = ended
     return job
 
 
-def _launch(item, goal: str, capture: Capture, then: Callable[[], None] | None, write: Callable[[], Path]) -> Job:
-    """A job at `capture`, which is the item's or stands in for it; `write` writes its job.json."""
+def _launch(item, goal: str, capture: Capture, then: Callable[[], None] | None, once: dict, **span) -> Job:
     root = captures.root(item)
     if root in _jobs:
         raise Problem("This capture is being worked on already.", "Wait for it, or click Cancel.")
     python = preferences.require_python()
     for prepare in before_start:
         prepare()
-    path = write()
+    path = write_job(capture, settings={**properties.job_settings(item), **once}, **span)
     settings = read_job(path).settings
-    job = start_worker(
-        root,
-        goal,
-        Worker(
-            python, ROOT, path, capture.logs / "worker.log", preferences.worker_environment(settings.delight.delighter)
-        ),
-        then,
-    )
+    environment = preferences.worker_environment(settings.delight.delighter)
+    worker = Worker(python, ROOT, path, capture.logs / "worker.log", environment)
+    job = start_worker(root, goal, worker, then)
     job.settings = settings
     return job
 
 
 def start_worker(root: str, goal: str, worker: Worker | BackgroundTask, then: Callable[[], None] | None = None) -> Job:
-    """Starts a worker, or puts it in line behind the one that runs, and listens to it. Raises Problem when it cannot.
+    """Start a worker, or put it in line behind the running one. Raises Problem if it cannot start.
 
-    Parameters
-    ----------
-    root : the capture's folder; "" for what is of no capture, which never waits
-    goal, worker, then : as Job has them
+    `root` is the capture's folder, or '' for work on no capture, which never waits.
     """
     waiting = root != "" and _busy()
     if not waiting:
@@ -190,8 +149,7 @@ def start_worker(root: str, goal: str, worker: Worker | BackgroundTask, then: Ca
 
 
 def cancel(root: str) -> None:
-    """Asks the capture's job ('': the installation) to stop; it does so within two seconds. One that waits leaves the
-    line."""
+    """Stop the capture's job ('': the installation) within two seconds; one that waits leaves the line."""
     if root in _jobs and _jobs[root].waiting:
         _leave(root)
     elif root in _jobs:
@@ -199,8 +157,10 @@ def cancel(root: str) -> None:
 
 
 def poll() -> bool:
-    """Takes in what the workers said. True while one is running. Makes no data-blocks; tests call it in place of the
-    timer."""
+    """Process the workers' messages, and return whether jobs are left. Makes no data-blocks.
+
+    Tests call it in place of the timer.
+    """
     for root, job in list(_jobs.items()):
         if job.waiting:
             continue
@@ -210,7 +170,11 @@ def poll() -> bool:
             _leave(root)
             if job.on_preview is not None:
                 job.on_preview(root)
-            _finish(root, job)
+            if job.well and job.then is not None:
+                try:
+                    job.then()
+                except Problem as problem:
+                    problems.show(root, problem)
     if not _busy():
         _start_next()
     return bool(_jobs)
@@ -221,7 +185,7 @@ def _busy() -> bool:
 
 
 def _start_next() -> None:
-    """The first job in line; one that cannot start says so in its capture's tab and makes room for the next."""
+    """Start the first job in line; one that fails shows its problem, and the next is tried."""
     for root, job in [(root, job) for root, job in _jobs.items() if job.waiting]:
         try:
             job.worker.start()
@@ -239,15 +203,6 @@ def _leave(root: str) -> None:
         job.ended()
 
 
-def _finish(root: str, job: Job) -> None:
-    """What follows a job that ended well, now that another one can begin."""
-    if job.well and job.then is not None:
-        try:
-            job.then()
-        except Problem as problem:
-            problems.show(root, problem)
-
-
 def _hear(root: str, job: Job, message: messages.Message) -> None:
     match message:
         case messages.Progress():
@@ -259,18 +214,7 @@ def _hear(root: str, job: Job, message: messages.Message) -> None:
         case messages.Log():
             job.log = [*job.log[-99:], message.text]
         case messages.StageDone():
-            job.progress, job.figures = None, message.figures
-            if job.on_stage is not None:
-                job.on_stage(message.stage)
-            if not message.skipped:
-                timings.record_stage(message.stage, message.seconds)
-            if (
-                message.stage == "solve"
-                and not message.skipped
-                and job.settings is not None
-                and not any("Going on after" in line for line in job.log)
-            ):
-                timings.record(job.settings, message.seconds)
+            _note_stage(job, message)
         case messages.Done():
             job.well = True
         case messages.Failed():
@@ -279,53 +223,59 @@ def _hear(root: str, job: Job, message: messages.Message) -> None:
             problems.show(root, problems.Notice("Cancelled.", "What was finished is kept; click again to continue."))
 
 
+def _note_stage(job: Job, message: messages.StageDone) -> None:
+    job.progress, job.figures = None, message.figures
+    if job.on_stage is not None:
+        job.on_stage(message.stage)
+    if message.skipped:
+        return
+    timings.record_stage(message.stage, message.seconds)
+    resumed = any("Going on after" in line for line in job.log)
+    if message.stage == "solve" and job.settings is not None and not resumed:
+        timings.record(job.settings, message.seconds)
+
+
 def _tick() -> float | None:
-    before, shown = dict(_jobs), _shown()
+    before, display = dict(_jobs), _shown()
     try:
         poll()
         ended = {root: job.goal for root, job in before.items() if root not in _jobs}
         if ended or incoming.waits():
             incoming.bring_in(ended)
-    except Exception as error:  # nobody is above a timer: without this, Blender would drop it and the tab stand still
-        problems.show("", error if isinstance(error, Problem) else unforeseen.explain(error, "listening to the solver"))
-    if shown != _shown():  # a redraw of the tab takes time from the worker, and from whoever paints
+    except Exception as error:  # Blender would drop the timer, and the tab would stand still
+        problems.show_error("", error, "listening to the solver")
+    if display != _shown():  # a redraw takes time from the worker, and from an artist who paints
         status.redraw()
     return INTERVAL_S if _jobs or incoming.waits() else None
 
 
 def _shown() -> list[tuple]:
-    """All that the tab shows of the jobs."""
+    """Return all that the tab shows of the jobs."""
     return [(root, job.waiting, job.progress, job.previews) for root, job in _jobs.items()]
 
 
 def eta(job: Job) -> str:
-    """What is left of the stage, and of the whole where the next ones' times are known from before, in words; '' when
-    unknown."""
+    """Describe the time left of the stage, and in all if the later stages' times are known; '' if unknown."""
     seconds = job.progress.eta_s if job.progress else None
+    if seconds is None:
+        return ""
     words = (
-        ""
-        if seconds is None
-        else iface_("{} s left").format(f"{seconds:.0f}")
+        iface_("{} s left").format(f"{seconds:.0f}")
         if seconds < 90
         else iface_("{} min left").format(f"{seconds / 60:.0f}")
     )
     later = job.planned[job.planned.index(job.stage) + 1 :] if job.stage in job.planned else ()
-    ahead = timings.of_stages(later) if later and seconds is not None else None
-    return (
-        words
-        if ahead is None
-        else iface_("{}, about {} min in all").format(words, max(1, round((seconds + ahead) / 60)))
-    )
+    ahead = timings.of_stages(later) if later else None
+    if ahead is None:
+        return words
+    return iface_("{}, about {} min in all").format(words, max(1, round((seconds + ahead) / 60)))
 
 
 def stage_label(job: Job) -> str:
     if job.waiting:
         return "Waiting"
-    return (
-        stages.LABELS[job.stage]
-        if job.stage in stages.LABELS
-        else {"install": "Installing", "ask": "Looking"}.get(job.goal, "Starting")
-    )
+    goal = {"install": "Installing", "ask": "Looking"}.get(job.goal, "Starting")
+    return stages.LABELS.get(job.stage, goal)
 
 
 def register():
@@ -333,7 +283,7 @@ def register():
 
 
 def unregister():
-    """Also when Blender closes: no worker outlives it (and if Blender dies, the end of its stdin stops the worker)."""
+    """End all workers, also when Blender closes; if Blender crashes, the end of its stdin stops the worker."""
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     for job in [job for job in _jobs.values() if not job.waiting]:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What to click next: one function from facts to a step. Knows no bpy, so that every state can be tested."""
+"""Next step: one function from facts to a button. Independent of bpy, so that every state can be tested."""
 
 from __future__ import annotations
 
@@ -17,21 +17,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Facts:
-    """What the decision depends on. `status` None: no capture, or not looked at yet."""
+    """Input of the decision; `status` is None without a capture, or before its first look."""
 
     has_capture: bool = False
     has_python: bool = False
-    running: str = ""  # what the capture's job is doing, a word of WORDS; '' for nothing
+    running: str = ""  # kind of the capture's job, a key of WORDS; '' for none
     painting: bool = False
-    head_time: float = -1.0  # modification time of the head.obj that is in the scene; -1: none
-    maps_time: float = -1.0  # of the maps that the material shows; -1: none assembled
+    head_time: float = -1.0  # modification time of the head.obj in the scene; -1: none
+    maps_time: float = -1.0  # of the material's maps; -1: none assembled
     status: Status | None = None
 
 
 @dataclass(frozen=True)
 class NextStep:
-    """One line of state, the large button below it (operator '' for none), and a small one for another way: (label,
-    operator, icon)."""
+    """Line of state, the large button below it ('' for no operator), and a small one (label, operator, icon)."""
 
     state: str
     label: str
@@ -45,7 +44,17 @@ SET_UP = NextStep("The solver is not set up on this machine.", "Install Solver",
 ASK = NextStep(
     "SwitchLight waits for your consent. Nothing was sent.", "Allow Sending", "wildcap.allow_sending", 'LOCKED'
 )
+PAINTING = NextStep(
+    "Red is shadow, green is protected. Paint adds, Ctrl takes away.",
+    "Save Mask and Leave",
+    "wildcap.finish_mask",
+    'CHECKMARK',
+)
+LOCATE = NextStep(
+    "The folder of this capture is not where it was.", "Locate Capture", "wildcap.locate_capture", 'VIEWZOOM'
+)
 MAKE = ("Make My Head", "wildcap.make_my_head", 'USER')
+CHOOSE = ("Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
 WORDS = {
     "make": "Making your head ...",
     "reconstruct": "Reconstructing ...",
@@ -61,84 +70,68 @@ WORDS = {
 
 
 def next_step(facts: Facts, translated: Callable[[str], str] = str) -> NextStep:
-    """The one thing to do now. A stale stage never drags the artist back before the mask; its row says so. `translated`
-    is for the sentences that names are put into; all others are translated as they are shown."""
+    """Return the one thing to do now. `translated` is for templates; whole sentences are translated when drawn.
+
+    Stale stages before the mask do not lead back to Reconstruct; their rows show it.
+    """
     if facts.painting:
-        return NextStep(
-            "Red is shadow, green is protected. Paint adds, Ctrl takes away.",
-            "Save Mask and Leave",
-            "wildcap.finish_mask",
-            'CHECKMARK',
-        )
+        return PAINTING
     if facts.running == "batch":
         return NextStep(WORDS["batch"], "Cancel Batch", "wildcap.cancel_batch", 'CANCEL')
     if facts.running:
         return NextStep(WORDS[facts.running], "Cancel", "wildcap.cancel", 'CANCEL')
     if not facts.has_capture:
-        return (
-            NextStep("No face yet.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
-            if facts.has_python
-            else SET_UP
-        )
+        return NextStep("No face yet.", *CHOOSE) if facts.has_python else SET_UP
     status = facts.status
     if status is None:
         return NextStep("Looking at the capture ...", "", "", 'TIME')
     if status.missing:
-        return NextStep(
-            "The folder of this capture is not where it was.", "Locate Capture", "wildcap.locate_capture", 'VIEWZOOM'
-        )
+        return LOCATE
     if status.problem is not None:
-        return NextStep("This capture cannot be used.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
-    return _step_of(facts, status, translated)
+        return NextStep("This capture cannot be used.", *CHOOSE)
+    return _continue(facts, status, translated)
 
 
-def _step_of(facts: Facts, status: Status, translated: Callable[[str], str]) -> NextStep:
-    # A capture without a source (the sample head) came finished up to its mask; there is nothing to reconstruct it
-    # from.
-    missing = (
-        [name for name in BEFORE_MASK if status.stages[name] == "to do"] if status.source or not status.has_head else []
-    )
-    if missing and not status.source:
-        return NextStep("This capture has no video yet.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
-    if (
-        missing[:1] == ["delight"]
-        and status.sending
-        and status.sending.frames
-        and not status.agreed
-        and facts.has_python
-    ):
-        return ASK
-    if missing:
-        begun = len(missing) < len(BEFORE_MASK)
-        state = (
-            translated("Stopped before {}.").format(translated(stages.by_name(missing[0]).label))
-            if begun
-            else "The video is chosen."
-        )
-        by_hand = ("Continue Reconstruction" if begun else "Reconstruct", "wildcap.reconstruct", 'MESH_MONKEY')
-        if not facts.has_python:
-            return SET_UP
-        return NextStep(state, *by_hand, alternative=MAKE) if begun else NextStep(state, *MAKE, alternative=by_hand)
+def _continue(facts: Facts, status: Status, translated: Callable[[str], str]) -> NextStep:
+    # The sample head has no source; it comes finished up to its mask.
+    to_do = [name for name in BEFORE_MASK if status.stages[name] == "to do"]
+    if to_do and (status.source or not status.has_head):
+        return _reconstruct(facts, status, to_do, translated)
     if facts.head_time < status.head_time:
         return NextStep("The head is ready.", "Bring In Head", "wildcap.bring_in_head", 'IMPORT')
-    solved = status.has_maps and status.stages["solve"] in (*FINISHED, "absent")
-    if not solved and status.interrupted:
-        words = "A solve was interrupted. It goes on from its last checkpoint, unless the settings changed."
-        step = NextStep(words, "Continue Solving", "wildcap.solve", 'LIGHT')
-        return step if facts.has_python else SET_UP
-    if not solved and not status.has_mask:
-        accept = ("Accept Proposal", "wildcap.accept_proposal", 'CHECKMARK') if facts.has_python else ()
-        return NextStep(
-            "Check the shadow mask, then Solve.", "Check Shadow Mask", "wildcap.paint_mask", 'BRUSH_DATA', accept
-        )
-    if not solved:
-        state = (
-            "The mask or the settings changed since the last solve."
-            if status.stages["solve"] == "stale"
-            else "The shadow mask is painted."
-        )
-        return NextStep(state, "Solve", "wildcap.solve", 'LIGHT') if facts.has_python else SET_UP
+    if not status.has_maps or status.stages["solve"] not in (*FINISHED, "absent"):
+        return _solve(facts, status)
     if facts.maps_time < status.maps_time:
         return NextStep("The maps are ready.", "Assemble Material", "wildcap.assemble_material", 'MATERIAL')
     state = translated("Rendered to renders/{}.").format(status.render) if status.render else "The head can be relit."
     return NextStep(state, "Render", "wildcap.render", 'RENDER_STILL')
+
+
+def _reconstruct(facts: Facts, status: Status, to_do: list[str], translated: Callable[[str], str]) -> NextStep:
+    if not status.source:
+        return NextStep("This capture has no video yet.", *CHOOSE)
+    if not facts.has_python:
+        return SET_UP
+    if to_do[0] == "delight" and status.sending and status.sending.frames and not status.agreed:
+        return ASK
+    reconstruct = ("wildcap.reconstruct", 'MESH_MONKEY')
+    if len(to_do) == len(BEFORE_MASK):
+        return NextStep("The video is chosen.", *MAKE, alternative=("Reconstruct", *reconstruct))
+    state = translated("Stopped before {}.").format(translated(stages.by_name(to_do[0]).label))
+    return NextStep(state, "Continue Reconstruction", *reconstruct, alternative=MAKE)
+
+
+def _solve(facts: Facts, status: Status) -> NextStep:
+    if not status.interrupted and not status.has_mask:
+        accept = ("Accept Proposal", "wildcap.accept_proposal", 'CHECKMARK') if facts.has_python else ()
+        return NextStep(
+            "Check the shadow mask, then Solve.", "Check Shadow Mask", "wildcap.paint_mask", 'BRUSH_DATA', accept
+        )
+    if not facts.has_python:
+        return SET_UP
+    if status.interrupted:
+        state = "A solve was interrupted. It goes on from its last checkpoint, unless the settings changed."
+        return NextStep(state, "Continue Solving", "wildcap.solve", 'LIGHT')
+    if status.stages["solve"] == "stale":
+        return NextStep("The mask or the settings changed since the last solve.", "Solve", "wildcap.solve", 'LIGHT')
+    return NextStep("The shadow mask is painted.", "Solve", "wildcap.solve", 'LIGHT')

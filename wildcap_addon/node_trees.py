@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shader nodes of materials and worlds: from Blender 5.0 on each has them from the start, and switching them on is
-deprecated."""
+"""Shader nodes of materials and worlds.
+
+From Blender 5.0 on they always exist, and enabling them is deprecated.
+"""
 
 import hashlib
 import json
@@ -10,7 +12,7 @@ import bpy
 
 
 def of(block: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree:
-    """The nodes by which a material or a world is shown."""
+    """Return the node tree of a material or a world, enabled."""
     if bpy.app.version < (5, 0, 0):
         block.use_nodes = True
     return block.node_tree
@@ -40,26 +42,23 @@ def feed(node: bpy.types.Node, inputs: dict | tuple) -> None:
 
 
 def fingerprint(material: bpy.types.Material, without: str) -> str:
-    """Stands for a material's nodes, their values and links; the pictures that they show, what stands where, and the
-    node `without` count for nothing."""
+    """Return a digest of a material's nodes, values and links, except images, positions and the node `without`."""
     if material.node_tree is None:
         return ""
-    told = []
+    content = []
     for node in sorted(material.node_tree.nodes, key=lambda node: node.name):
         if node.name != without:
             defaults = [_plain(socket.default_value) for socket in node.inputs if hasattr(socket, "default_value")]
             links = [
                 [link.from_node.name, link.from_socket.identifier] for socket in node.inputs for link in socket.links
             ]
-            told.append([node.name, node.bl_idname, node.mute, defaults, links])
-    return hashlib.blake2b(json.dumps(told).encode(), digest_size=16).hexdigest()
+            content.append([node.name, node.bl_idname, node.mute, defaults, links])
+    return hashlib.blake2b(json.dumps(content).encode(), digest_size=16).hexdigest()
 
 
 def _plain(value):
     if isinstance(value, float):
         return round(value, 5)
-    return (
-        str(value)
-        if isinstance(value, (str, int)) or not hasattr(value, "__len__")
-        else [round(float(component), 5) for component in value]
-    )
+    if isinstance(value, (str, int)) or not hasattr(value, "__len__"):
+        return str(value)
+    return [round(float(component), 5) for component in value]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tab: a line of state, one large button for the next step, what a running job does, and a row per stage."""
+"""Tab: a line of state, the button for the next step, running jobs, and a row per stage."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.capture import stages
 from . import batches, captures, jobs, next_step, preferences, problems, status
-from .base_panel import WildcapPanel, region_width
+from .base_panel import CapturePanel, FoldedPanel, WildcapPanel, region_width
 from .paint import session
 
 STATE_ICONS = {
@@ -27,13 +27,12 @@ class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
     bl_label = "WildCap"
 
     def draw(self, context):
-        layout = self.layout
+        layout, width = self.layout, region_width(context)
         item = captures.active(context)
         root = captures.root(item)
         step = next_step.next_step(gather(context, item), iface_)
         if item is not None:
             layout.label(text=item.name, icon='USER')
-        width = region_width(context)
         problems.draw_text(layout, step.state, width)
         job = jobs.of(root) or jobs.of("")
         if job is not None:
@@ -49,8 +48,9 @@ class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
             layout.operator("wildcap.use_python", icon='FILE_FOLDER')
         if item is None:
             layout.operator("wildcap.open_sample_head", icon='USER')
-        known = status.of(item) if item is not None else None
-        problems.draw(layout, problems.of(root) or problems.of("") or (known.problem if known else None), width)
+        capture_status = status.of(item) if item is not None else None
+        status_problem = capture_status.problem if capture_status else None
+        problems.draw(layout, problems.of(root) or problems.of("") or status_problem, width)
         for folder, other in jobs.elsewhere(root):
             box = layout.box()
             box.label(text=Path(folder).stem, icon='USER')
@@ -58,44 +58,24 @@ class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
             box.operator("wildcap.cancel", icon='CANCEL').capture = folder
 
 
-class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
+class WILDCAP_PT_stages(CapturePanel, bpy.types.Panel):
     bl_label = "Stages"
     bl_order = 5
-    bl_parent_id = "WILDCAP_PT_main"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    @classmethod
-    def poll(cls, context):
-        return captures.active(context) is not None
 
     def draw(self, context):
         item = captures.active(context)
-        known = status.of(item)
-        job = jobs.of(captures.root(item))
+        capture_status, job = status.of(item), jobs.of(captures.root(item))
         column = self.layout.column(align=True)
-        ready = known is not None and bool(known.source or known.has_head)  # for the first stage that is to do
+        # whether the first stage that is to do gets a button
+        ready = bool(capture_status and (capture_status.source or capture_status.has_head))
         for stage in stages.STAGES:
-            state = (
-                "running"
-                if job and job.stage == stage.name
-                else known.stages.get(stage.name, "to do")
-                if known
-                else "to do"
-            )
-            if (
-                state == "to do"
-                and known
-                and not known.source
-                and known.has_head
-                and stage.name in next_step.BEFORE_MASK
-            ):
-                state = "not needed"  # the sample head came without what it was made from
+            state = "running" if job and job.stage == stage.name else _state(capture_status, stage.name)
             split = column.split(factor=0.47)
             split.label(text=stage.label, icon=STATE_ICONS[state])
             row = split.row()
-            row.label(text=_words(state, known, stage.name))
+            row.label(text=_words(state, capture_status, stage.name))
             if state == "running" and job.progress and job.progress.of > 0:
-                row.label(text=f"{min(1.0, job.progress.done / job.progress.of):.0%}")
+                row.label(text=f"{_share(job.progress):.0%}")
             if job is None and (state in ("done", "stale", "older") or state == "to do" and ready):
                 icon = 'PLAY' if state == "to do" else 'FILE_REFRESH'
                 if stage.name == "solve":
@@ -105,26 +85,23 @@ class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
             ready = ready and state not in ("to do", "running")
 
 
-class WILDCAP_PT_doctor(WildcapPanel, bpy.types.Panel):
-    """What is wrong with the video and how to shoot it again, as the report tells it."""
+class WILDCAP_PT_doctor(FoldedPanel, bpy.types.Panel):
+    """Problems of the video and how to film it again, as in the report."""
 
     bl_label = "Video Doctor"
     bl_order = 4
-    bl_parent_id = "WILDCAP_PT_main"
-    bl_options = {'DEFAULT_CLOSED'}
 
     @classmethod
     def poll(cls, context):
         item = captures.active(context)
-        known = status.of(item) if item is not None else None
-        return known is not None and bool(known.findings)
+        capture_status = status.of(item) if item is not None else None
+        return capture_status is not None and bool(capture_status.findings)
 
     def draw_header(self, context):
         self.layout.label(text="", icon='ERROR')
 
     def draw(self, context):
-        layout = self.layout
-        width = region_width(context)
+        layout, width = self.layout, region_width(context)
         for finding in status.of(captures.active(context)).findings:
             problems.draw_text(layout.column(), finding["problem"], width, 'CANCEL' if finding["stopped"] else 'ERROR')
             problems.draw_text(layout.column(), finding["remedy"], width, 'INFO')
@@ -132,17 +109,20 @@ class WILDCAP_PT_doctor(WildcapPanel, bpy.types.Panel):
 
 
 def gather(context, item) -> next_step.Facts:
-    """What the next step depends on, from what is known already."""
+    """Return the input of the next step, without touching the disk."""
+    has_python = preferences.python() is not None
     if item is None:
-        return next_step.Facts(
-            has_python=preferences.python() is not None, running=jobs.of("").goal if jobs.of("") else ""
-        )
-    head = captures.head(context, item)
-    job = jobs.of(captures.root(item)) or jobs.of("")
+        return next_step.Facts(has_python=has_python, running=jobs.of("").goal if jobs.of("") else "")
+    root, head = captures.root(item), captures.head(context, item)
+    job = jobs.of(root) or jobs.of("")
+    if job is None:
+        running = "batch" if batches.works_on(root) else ""
+    else:
+        running = "wait" if job.waiting else job.goal
     return next_step.Facts(
         has_capture=True,
-        has_python=preferences.python() is not None,
-        running=_running(job, captures.root(item)),
+        has_python=has_python,
+        running=running,
         painting=session.active(),
         head_time=head.get("wildcap_head_time", 0.0) if head else -1.0,
         maps_time=head.get("wildcap_maps_time", -1.0) if head else -1.0,
@@ -150,17 +130,10 @@ def gather(context, item) -> next_step.Facts:
     )
 
 
-def _running(job: jobs.Job | None, root: str) -> str:
-    """What is being done with a capture, as a word of next_step.WORDS; '' for nothing."""
-    if job is None:
-        return "batch" if batches.works_on(root) else ""
-    return "wait" if job.waiting else job.goal
-
-
 def draw_job(layout, job: jobs.Job, cancel: str = "") -> None:
-    """Stage, how far it is, and how long it will take; beside it a small button for the operator `cancel`."""
+    """Draw a job's stage, progress and time left; beside it a small button for the operator `cancel`."""
     progress = job.progress
-    factor = min(1.0, progress.done / progress.of) if progress and progress.of > 0 else 0.0
+    factor = _share(progress) if progress and progress.of > 0 else 0.0
     row = layout.row(align=True)
     row.progress(text=f"{iface_(jobs.stage_label(job))}  {factor:.0%}", translate=False, factor=factor)
     if cancel:
@@ -170,6 +143,17 @@ def draw_job(layout, job: jobs.Job, cancel: str = "") -> None:
     for line in (iface_(progress.text) if progress and progress.text else "", jobs.eta(job)):
         if line:
             column.label(text=line[:1].upper() + line[1:], translate=False)
+
+
+def _share(progress) -> float:
+    return min(1.0, progress.done / progress.of)
+
+
+def _state(capture_status: status.Status | None, stage: str) -> str:
+    state = capture_status.stages.get(stage, "to do") if capture_status else "to do"
+    # the sample head comes without what it was made from
+    is_sample = capture_status and capture_status.has_head and not capture_status.source
+    return "not needed" if state == "to do" and is_sample and stage in next_step.BEFORE_MASK else state
 
 
 def _words(state: str, capture_status: status.Status | None, stage: str) -> str:

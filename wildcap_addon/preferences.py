@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension's preferences: the Python that runs the solver, and where captures go."""
+"""Preferences of the extension: the solver's Python, and the folder of captures."""
 
 import os
 import sys
@@ -37,13 +37,12 @@ SOURCES = [
     (
         'pip',
         "As pip Is Set Up",
-        "All packages from where this machine's pip is set up to look (pip.conf, PIP_INDEX_URL), as with a "
-        "studio's own index; "
-        "that also decides what its PyTorch computes on",
+        "All packages from the index of this machine's pip configuration (pip.conf, PIP_INDEX_URL), such as a "
+        "studio's own; that also decides what its PyTorch computes on",
     ),
 ]
 DEVICES = {"cpu": "CPU", "cuda": "CUDA", "mps": "Metal", "": ""}
-_aside: set[str] = set()  # Pythons that were found not to answer, in this session
+_aside: set[str] = set()  # Pythons that did not answer in this session
 
 
 class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
@@ -57,29 +56,32 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
     environment: bpy.props.StringProperty(
         name="Solver Folder",
         subtype='DIR_PATH',
-        description="Where Install Solver puts its packages; empty: .wildcap/solver in your home folder",
+        description="Folder of Install Solver's packages; empty: .wildcap/solver in your home folder",
     )
     compute: bpy.props.EnumProperty(
-        name="Compute On", items=COMPUTES, default='auto', description="What Install Solver downloads PyTorch for"
+        name="Compute On",
+        items=COMPUTES,
+        default='auto',
+        description="Hardware that Install Solver downloads PyTorch for",
     )
     packages: bpy.props.EnumProperty(
-        name="Packages From", items=SOURCES, default='pytorch', description="Where Install Solver downloads from"
+        name="Packages From", items=SOURCES, default='pytorch', description="Source of Install Solver's downloads"
     )
     wheels: bpy.props.StringProperty(
         name="Wheels",
         subtype='DIR_PATH',
         description="The folder of wheels that Install Solver takes all packages from",
     )
-    device: bpy.props.StringProperty(name="Device", description="What the solver's Python was found to compute on")
+    device: bpy.props.StringProperty(name="Device", description="Device that the solver's Python computes on")
     device_reason: bpy.props.StringProperty(
-        name="Why This Device", description="What was found when the solver's devices were tried"
+        name="Why This Device", description="Result of the test of the solver's devices"
     )
-    tested: bpy.props.StringProperty(name="Self-Test", description="How the last self-test ended")
+    tested: bpy.props.StringProperty(name="Self-Test", description="Result of the last self-test")
     captures: bpy.props.StringProperty(
         name="Captures Folder",
         subtype='DIR_PATH',
-        description="Where new captures go while the .blend is not saved; empty: WildCap in your home folder, which no "
-        "cloud copies",
+        description="Folder of new captures while the .blend is not saved; empty: WildCap in your home folder, which "
+        "no cloud copies",
     )
 
     switchlight_key: bpy.props.StringProperty(
@@ -100,8 +102,7 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
 
 
 def draw_solver(layout, preferences) -> None:
-    """Whether there is a solver, and the buttons that make, choose and remove one: here, and in the tab until there is
-    one."""
+    """Draw the state of the solver, and the buttons that install, choose and remove one."""
     ready = python() is not None
     device = DEVICES.get(preferences.device, preferences.device)
     if ready and device:
@@ -130,7 +131,7 @@ def draw_solver(layout, preferences) -> None:
 
 
 def draw_links(layout) -> None:
-    """Where WildCap is on the web, as far as that is set."""
+    """Draw the links to WildCap's pages that are set."""
     row = layout.row()
     for text, address in (("Website", links.WEBSITE), ("Report a Problem", links.REPORTS)):
         if address:
@@ -138,7 +139,7 @@ def draw_links(layout) -> None:
 
 
 def draw_key(layout, label: str) -> None:
-    """Where the key of SwitchLight comes from: here, and beside the delighter."""
+    """Draw the source of SwitchLight's key."""
     if os.environ.get(switchlight_api.KEY_VARIABLE):
         text = iface_("The key comes from the environment variable {}").format(switchlight_api.KEY_VARIABLE)
         layout.label(text=text, translate=False, icon='CHECKMARK')
@@ -150,38 +151,34 @@ def get() -> WILDCAP_AP_preferences:
     return bpy.context.preferences.addons[extension.NAME].preferences
 
 
-def has_switchlight_key() -> bool:
-    return bool(os.environ.get(switchlight_api.KEY_VARIABLE) or get().switchlight_key)
+def switchlight_key() -> str:
+    """Return the key of SwitchLight, that of the environment first; '' for none."""
+    return os.environ.get(switchlight_api.KEY_VARIABLE) or get().switchlight_key
 
 
 def worker_environment(delighter: str) -> dict[str, str]:
-    """What a worker is told by its environment alone: the key of a paid delighter, the machine's own first, and that
-    Blender is to stay offline. Others do not get to know the key."""
+    """Return the environment variables of a worker: SwitchLight's gets the key, and whether Blender is offline."""
     if delighter != "switchlight":
         return {}
-    key = os.environ.get(switchlight_api.KEY_VARIABLE) or get().switchlight_key
-    return {
-        switchlight_api.KEY_VARIABLE: key,
-        **({} if bpy.app.online_access else {switchlight_api.OFFLINE_VARIABLE: "1"}),
-    }
+    offline = {} if bpy.app.online_access else {switchlight_api.OFFLINE_VARIABLE: "1"}
+    return {switchlight_api.KEY_VARIABLE: switchlight_key(), **offline}
 
 
 def require_online(otherwise: str) -> None:
-    """Raises Problem while Blender is told to stay off the network; `otherwise` is what else the artist can do, as the
-    end of a sentence."""
+    """Raise Problem if Blender is set to work offline; `otherwise` is the alternative, as the end of a sentence."""
     if not bpy.app.online_access:
         where = "" if bpy.app.online_access_override else " (Preferences, System, Network)"
         raise Problem("Blender is set to work offline.", f"Allow online access{where}, or {otherwise}.")
 
 
 def python() -> Path | None:
-    """The solver's Python, if it is set and there, and was not found to be broken."""
+    """Return the solver's Python, if it is set, exists and has not failed."""
     path = bpy.path.abspath(get().python)
     return Path(path) if path and path not in _aside and Path(path).is_file() else None
 
 
 def require_python() -> Path:
-    """As `python`. Raises Problem where there is none."""
+    """Return the solver's Python. Raises Problem if there is none."""
     path = python()
     if path is None:
         raise Problem(
@@ -192,12 +189,12 @@ def require_python() -> Path:
 
 
 def set_aside(path: Path) -> None:
-    """Takes a Python that does not answer for none, until it is chosen or installed again."""
+    """Ignore a Python that does not answer, until it is chosen or installed again."""
     _aside.add(str(path))
 
 
 def set_python(path: Path | None, device: str = "", reason: str = "") -> None:
-    """Makes `path` the solver's Python; `device` is what it was found to compute on, `reason` why."""
+    """Set the solver's Python, the device that it computes on, and why."""
     _aside.discard(str(path))
     if get().python != str(path or ""):
         get().tested = ""
@@ -206,14 +203,16 @@ def set_python(path: Path | None, device: str = "", reason: str = "") -> None:
 
 
 def environment_folder() -> Path:
-    """Where Install Solver makes its environment: kept across updates, outside the extension's own files."""
-    chosen = get().environment
-    return Path(bpy.path.abspath(chosen)) if chosen else environment.default_folder()
+    """Return the folder of Install Solver's environment, outside the extension's own files, which updates replace."""
+    path = get().environment
+    return Path(bpy.path.abspath(path)) if path else environment.default_folder()
 
 
 def wheels_folder() -> Path | None:
-    """The folder of wheels to install from; None where packages come from elsewhere. Raises Problem where it is
-    none."""
+    """Return the folder of wheels to install from; None if packages come from elsewhere.
+
+    Raises Problem if it has no wheels.
+    """
     if get().packages != 'folder':
         return None
     folder = Path(bpy.path.abspath(get().wheels))
@@ -226,15 +225,15 @@ def wheels_folder() -> Path | None:
 
 
 def captures_folder(saved: bool = True) -> Path:
-    """Beside the .blend; while it is unsaved (or with saved=False), the preferences' folder or WildCap in the user's
-    home: clouds copy Documents and Desktop, and a capture holds gigabytes of a person's face."""
+    """Return the .blend's folder; while it is unsaved (or with saved=False), the preferences' folder or the default."""
     if bpy.data.filepath and saved:
         return Path(bpy.data.filepath).parent
-    chosen = get().captures
-    return Path(bpy.path.abspath(chosen)) if chosen else captures_default()
+    path = get().captures
+    return Path(bpy.path.abspath(path)) if path else captures_default()
 
 
 def captures_default() -> Path:
+    """Return WildCap in the user's home: clouds copy Documents and Desktop, and a capture is large and personal."""
     return Path.home() / "WildCap"
 
 

@@ -1,17 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What went wrong last, and what to do about it: kept per capture until something works, shown under the next step."""
+"""Last problem of each capture and its remedy, shown under the next step until something succeeds."""
 
 import textwrap
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
+from ..core.capture import unforeseen
 from ..core.capture.messages import Problem
 
 
 class Notice(Problem):
-    """What the artist asked for, told in the place of a problem, but calmly."""
+    """Result that the artist asked for, shown in the place of a problem."""
 
 
 _problems: dict[str, Problem] = {}  # capture folder ('' for none) -> its last problem
@@ -19,6 +20,11 @@ _problems: dict[str, Problem] = {}  # capture folder ('' for none) -> its last p
 
 def show(root: str, problem: Problem) -> None:
     _problems[root] = problem
+
+
+def show_error(root: str, error: Exception, activity: str) -> None:
+    """Show any error: a Problem as it is, others as an error inside WildCap that stopped something."""
+    show(root, error if isinstance(error, Problem) else unforeseen.explain(error, activity))
 
 
 def clear(root: str) -> None:
@@ -30,7 +36,7 @@ def of(root: str) -> Problem | None:
 
 
 def draw(layout, problem: Problem | None, width: int) -> None:
-    """Problem and remedy, wrapped to a region `width` pixels wide."""
+    """Draw problem and remedy, wrapped to a region `width` pixels wide."""
     if problem is None:
         return
     box = layout.box()
@@ -43,15 +49,7 @@ def draw(layout, problem: Problem | None, width: int) -> None:
 
 
 def draw_text(layout, text: str, width: int, icon: str = 'NONE') -> None:
-    """A text, translated as a whole, over as many lines as it needs.
-
-    Parameters
-    ----------
-    layout : drawn into
-    text : English
-    width : of the region, in pixels
-    icon : before the first line
-    """
+    """Draw an English text, translated as a whole, wrapped to a region `width` pixels wide."""
     column = layout.column(align=True)
     column.scale_y = 0.8
     lines = wrapped(iface_(text), width - (45 if icon != 'NONE' else 0))
@@ -60,6 +58,6 @@ def draw_text(layout, text: str, width: int, icon: str = 'NONE') -> None:
 
 
 def wrapped(text: str, width: int) -> list[str]:
-    """Lines that fit a panel `width` pixels wide; long words (paths) are broken, nothing is cut."""
+    """Return lines that fit a panel `width` pixels wide; long words (paths) are broken, nothing is cut."""
     scale = bpy.context.preferences.system.ui_scale or 1.0  # 0 without a window
     return textwrap.wrap(text, max(20, int((width / scale - 50) / 6))) or [""]

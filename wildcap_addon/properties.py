@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the .blend keeps: the list of captures and each one's settings. Groups are built from core.capture.settings.
+"""Properties of the .blend: the list of captures and each one's settings.
 
-Default, range, unit and tooltip of every setting are written there; run-time state lives in `jobs` and `status`.
+The groups are built from core.settings, which has every setting's default, range, unit and tooltip. Run-time state is
+in `jobs` and `status`.
 """
 
 from dataclasses import fields
@@ -20,12 +21,12 @@ from . import captures, preferences
 from . import hdri as worlds
 
 SUBTYPES = {"file": 'FILE_PATH', "file_or_folder": 'FILE_PATH', "folder": 'DIR_PATH'}
-"""How what names a place on the disk is chosen; in a file browser a folder can be named where a file is asked for."""
+"""Subtypes of paths; a browser for files also accepts a folder's name."""
 SHARED_TOOLTIPS = core_settings.tooltips(core_settings.Settings)
 
 
 def settings_group(stage: str, kind: type) -> type:
-    """A PropertyGroup with one property per field of a stage's settings."""
+    """Return a PropertyGroup with one property per field of a stage's settings."""
     annotations = {f.name: _property(f, core_settings.tooltips(kind)[f.name]) for f in fields(kind)}
     return type(
         f"WILDCAP_PG_{stage}", (bpy.types.PropertyGroup,), {"__annotations__": annotations, "__doc__": kind.__doc__}
@@ -50,7 +51,7 @@ def _property(field, tooltip: str):
 
 
 def _choice(field, value: str) -> tuple[str, str, str]:
-    """An item of an EnumProperty: identifier, name, description."""
+    """Return an item of an EnumProperty: identifier, name, description."""
     card = delighter_cards.CARDS.get(value) if field.name == "delighter" else None
     if card:
         return value, card.title, card.what
@@ -75,7 +76,7 @@ def _apply_quality(self, context):
 
 
 class WILDCAP_PG_capture(bpy.types.PropertyGroup):
-    """One capture folder in the scene's list."""
+    """Item of the scene's list: one capture folder."""
 
     path: bpy.props.StringProperty(
         name="Capture Folder", subtype='DIR_PATH', description="The folder that holds everything about this face"
@@ -91,15 +92,15 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
         items=[(q, q.title(), "") for q in core_settings.QUALITIES],
         default="standard",
         update=_apply_quality,
-        description="Draft to look, standard to work, film to deliver. Choosing one sets the fields of all stages that "
-        "it covers: change single ones afterwards",
+        description="Draft for previews, standard for work, film for delivery. Choosing one sets the fields of all "
+        "stages that it covers: change single ones afterwards",
     )
     device: bpy.props.EnumProperty(
         name="Device",
         default="auto",
         description=SHARED_TOOLTIPS["device"],
         items=[
-            ("auto", "Automatic", "Where a pass of the solver's network ran fastest when it was set up"),
+            ("auto", "Automatic", "The device on which the solver's network ran fastest when it was set up"),
             ("cpu", "CPU", ""),
             ("cuda", "CUDA", ""),
             ("mps", "Metal", ""),
@@ -121,16 +122,14 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
         description="Mean colour of the facial skin without lips, brows and stubble, as the eye sees it (sRGB)",
     )
     estimated_tone: bpy.props.FloatVectorProperty(
-        name="Estimated Tone", size=3, options={'HIDDEN'}, description="What the last estimate was"
+        name="Estimated Tone", size=3, options={'HIDDEN'}, description="Last estimated tone"
     )
-    tone_group: bpy.props.StringProperty(
-        name="Tone Group", options={'HIDDEN'}, description="What such a tone is called"
-    )
+    tone_group: bpy.props.StringProperty(name="Tone Group", options={'HIDDEN'}, description="Name of the tone's group")
     tone_source: bpy.props.StringProperty(
-        name="Tone Source", options={'HIDDEN'}, description="What the last estimate was taken from"
+        name="Tone Source", options={'HIDDEN'}, description="Source of the last estimate"
     )
     tone_deviation: bpy.props.FloatProperty(
-        name="Tone Deviation", options={'HIDDEN'}, description="One deviation of its lightness L*"
+        name="Tone Deviation", options={'HIDDEN'}, description="Standard deviation of its lightness L*"
     )
 
 
@@ -151,11 +150,11 @@ LIGHTS = (
     ('coloured', "Coloured", "Teal from one side, magenta from the other, a white strip from above", 6),
     ('hdri', "HDRI", "The surroundings of a panoramic picture", 3),
 )
-"""Identifier, name, tooltip, and the number by which files keep it (0 was once named studio)"""
+"""Identifier, name, tooltip, and the number that files store (0 was once named studio)."""
 
 
 class WILDCAP_PG_scene(bpy.types.PropertyGroup):
-    """The scene's captures and how they are lit."""
+    """Captures of the scene, and their light."""
 
     captures: bpy.props.CollectionProperty(type=WILDCAP_PG_capture)
     active_index: bpy.props.IntProperty(
@@ -175,13 +174,13 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
     hdri_file: bpy.props.StringProperty(
         name="Own File",
         subtype='FILE_PATH',
-        description="A panoramic HDR picture of your own; it comes before the one above",
+        description="A panoramic HDR picture of your own; it replaces the one above",
     )
     hdri_rotation: bpy.props.FloatProperty(
         name="Rotation", subtype='ANGLE', description="Turns the light about the head, counter-clockwise from above"
     )
     hdri_strength: bpy.props.FloatProperty(
-        name="Strength", min=0, soft_max=4, default=1, description="How bright the surroundings are"
+        name="Strength", min=0, soft_max=4, default=1, description="Brightness of the surroundings"
     )
     shadow_tint: bpy.props.FloatVectorProperty(
         name="Shadow Tint",
@@ -202,7 +201,7 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
         description="Colour in which the protect mask is shown",
     )
     tint_strength: bpy.props.FloatProperty(
-        name="Tint Strength", min=0.05, max=1, default=0.45, description="How strongly a mask covers the texture"
+        name="Tint Strength", min=0.05, max=1, default=0.45, description="Opacity of a mask over the texture"
     )
     resolution: bpy.props.IntProperty(
         name="Resolution", subtype='PIXEL', min=16, max=8192, default=1024, description="Side of the rendered picture"
@@ -213,13 +212,13 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
     view: bpy.props.EnumProperty(
         name="View",
         default='Standard',
-        description="How the picture is shown; the linear EXR beside it is the same in both",
+        description="View transform of the picture; the linear EXR beside it is the same in both",
         items=[
             ('Standard', "Standard", "Colours as they are; what is brighter than white is cut off"),
             (
                 'AgX',
                 "AgX",
-                "As on film: bright lights and strong colours fade softly; a skin's tone is not what it was",
+                "As on film: bright lights and strong colours fade softly, which changes the skin tone",
             ),
         ],
     )
@@ -238,13 +237,13 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
     turn_file: bpy.props.EnumProperty(
         name="As",
         default='MP4',
-        description="What renders/turntable gets",
+        description="Format of renders/turntable",
         items=[('MP4', "Video", "One MP4"), ('PNG', "Pictures", "A PNG per frame")],
     )
 
 
 def job_settings(item: WILDCAP_PG_capture) -> dict:
-    """The settings of a capture as a job file holds them: stage -> {name: value}, seed, device. Paths are absolute."""
+    """Return a capture's settings for a job file: stage -> {name: value}, seed, device. Paths are absolute."""
     stage_settings = {
         stage: {f.name: _value(getattr(item, stage), f) for f in fields(kind)} for stage, kind in STAGE_KINDS.items()
     }
@@ -252,23 +251,22 @@ def job_settings(item: WILDCAP_PG_capture) -> dict:
     return {**stage_settings, "seed": item.seed, "device": device(item)}
 
 
-def take(item: WILDCAP_PG_capture, quality: str, chosen: core_settings.Settings) -> None:
-    """Has the fields say what a job of that quality with these settings would be told."""
+def take(item: WILDCAP_PG_capture, quality: str, new_settings: core_settings.Settings) -> None:
+    """Set the fields to a job's quality and settings."""
     item.quality = quality
     for stage, kind in STAGE_KINDS.items():
         for f in fields(kind):
-            setattr(getattr(item, stage), f.name, getattr(getattr(chosen, stage), f.name))
-    tone = _parsed_tone(chosen.solve.skin_tone)
+            setattr(getattr(item, stage), f.name, getattr(getattr(new_settings, stage), f.name))
+    tone = _parsed_tone(new_settings.solve.skin_tone)
     item.use_skin_tone = tone is not None
     item.skin_tone = tone or item.skin_tone
-    item.seed, item.device = chosen.seed, chosen.device
+    item.seed, item.device = new_settings.seed, new_settings.device
 
 
 def _tone(item: WILDCAP_PG_capture) -> str:
-    """The skin tone as a job is told it: as the record wrote it from which the fields were taken, for as long as it is
-    that tone."""
-    told, chosen = _parsed_tone(item.solve.skin_tone), format_skin_tone(item.skin_tone)
-    return item.solve.skin_tone if told is not None and format_skin_tone(told) == chosen else chosen
+    """Return the skin tone as text; unchanged, it is the very text that `take` got, so that nothing becomes stale."""
+    recorded, current = _parsed_tone(item.solve.skin_tone), format_skin_tone(item.skin_tone)
+    return item.solve.skin_tone if recorded is not None and format_skin_tone(recorded) == current else current
 
 
 def _parsed_tone(text: str) -> tuple[float, float, float] | None:
@@ -284,8 +282,7 @@ def _value(group, field):
 
 
 def device(item: WILDCAP_PG_capture) -> str:
-    """'cpu', 'cuda' or 'mps': the capture's own choice, else what the solver's Python was found to compute on; 'auto'
-    where that is not known yet."""
+    """Return 'cpu', 'cuda' or 'mps': the capture's choice, else the solver's device; 'auto' before that is known."""
     return item.device if item.device != "auto" else preferences.get().device or "auto"
 
 

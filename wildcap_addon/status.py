@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is finished and fresh in a capture's folder, looked up outside of `draw` and kept until the folder or the
-settings change.
+"""State of each capture's stages and results, read outside `draw` and kept until the folder or the settings change.
 
-A panel asks `of(item)`, which only reads the last answer and notes that somebody wants to know; a timer looks.
+A panel asks `of(item)`, which returns the last result and marks the capture as wanted; a timer looks for news.
 """
 
 import queue
@@ -17,15 +16,18 @@ from ..core.capture import consent, freshness, mask_edit, newest_maps, report, s
 from ..core.capture.capture import Capture
 from ..core.capture.messages import Problem
 from . import captures, properties
+from .batch_watch import modified_ns
 
 INTERVAL_S = 1.0  # between two looks at the capture's folder
 
 
 @dataclass(frozen=True)
 class Status:
-    """What a capture's folder says. `stages`: name -> 'to do', 'done', 'stale', 'older' (made by older code, kept) or
-    'absent' (outputs came from elsewhere, without a record); `versions`: name -> the WildCap that made what is
-    older."""
+    """State of a capture's folder.
+
+    `stages`: name -> 'to do', 'done', 'stale', 'older' (made by older code, kept) or 'absent' (outputs from elsewhere,
+    without a record); `versions`: name -> the WildCap version that made an older stage.
+    """
 
     source: str = ""
     stages: dict = field(default_factory=dict)
@@ -37,90 +39,93 @@ class Status:
     has_maps: bool = False
     maps_time: float = 0.0
     render: str = ""
-    whole_solve: str = ""  # why an edited part of the mask cannot be solved alone; '' where it can
-    interrupted: bool = False  # a solve was stopped on its way, and can go on from its checkpoint
-    findings: tuple[dict, ...] = ()  # what is wrong with the capture, as core.capture.report.findings tells it
+    whole_solve: str = ""  # why an edited part of the mask cannot be solved alone; '' if it can
+    interrupted: bool = False  # a solve stopped early and can continue from its checkpoint
+    findings: tuple[dict, ...] = ()  # problems of the capture, from core.capture.report.findings
     problem: Problem | None = None
-    missing: bool = False  # the folder is not there
-    # what SwitchLight, where it is chosen, would get of the frames; None before there are any
-    sending: consent.Sending | None = None
-    agreed: bool = False  # whether the artist agreed to that
+    missing: bool = False  # the folder does not exist
+    sending: consent.Sending | None = None  # frames that SwitchLight, if chosen, would get; None before there are any
+    agreed: bool = False  # the artist agreed to that
 
 
 _known: dict[str, tuple[tuple, Status]] = {}  # capture folder -> (stamp, status)
 _wanted: set[str] = set()
-_looking: set[str] = set()  # captures that a thread is looking at
-_found: queue.SimpleQueue = queue.SimpleQueue()  # what such a thread has seen: (capture folder, stamp, status)
+_looking: set[str] = set()  # captures that a thread is reading
+_found: queue.SimpleQueue = queue.SimpleQueue()  # results of the threads: (capture folder, stamp, status)
 
 
 def of(item) -> Status | None:
-    """The last known status of a list item, None before the first look."""
+    """Return the last known status of a list item, None before the first look."""
     root = captures.root(item)
     _wanted.add(root)
     return _known[root][1] if root in _known else None
 
 
 def refresh(context) -> None:
-    """Looks at every capture of the scene that is wanted or active, where something changed since the last look."""
+    """Read the scene's captures that are wanted or active, if they have changed."""
     active = captures.active(context)
     for item in context.scene.wildcap.captures:
         root = captures.root(item)
         if root in _wanted or item == active:
-            _look(root, item)
+            capture = captures.folder(item)
+            stamp = _stamp(capture, repr(properties.job_settings(item)))
+            if root not in _known or _known[root][0] != stamp:
+                _known[root] = (stamp, look(capture, properties.settings(item)))
 
 
 def look(capture: Capture, settings) -> Status:
-    """Reads the folder; hashes only files that changed since they were last hashed."""
+    """Read the folder; only files that have changed are hashed."""
     if not capture.root.is_dir():
-        return Status(
-            missing=True,
-            problem=Problem(
-                f"The capture folder {capture.root} is not there any more.",
-                "Connect its disk, or click Locate Capture and show where it is now.",
-            ),
+        problem = Problem(
+            f"The capture folder {capture.root} does not exist.",
+            "Connect its disk, or click Locate Capture and choose its new place.",
         )
+        return Status(missing=True, problem=problem)
     try:
         record = capture.read()
         verdicts = {stage.name: _verdict(capture, stage, record, settings) for stage in stages.STAGES}
-        worn = newest_maps.find_newest_maps(capture)
+        maps = newest_maps.find_newest_maps(capture)
     except Problem as problem:
         return Status(problem=problem)
     except OSError as error:
-        return Status(
-            problem=Problem(
-                f"The capture folder {capture.root} cannot be read ({error.strerror or error}).",
-                "Check the disk, or open the capture from where it is now.",
-            )
-        )
-    maps_time = max(map(_time, worn))
+        remedy = "Check the disk, or open the capture from its new place."
+        return Status(problem=_unreadable(capture, error.strerror or error, remedy))
+    maps_time = max(map(_time, maps))
     render = max(capture.renders.glob("[!.]*.png"), key=_time, default=Path())
-    states = {name: verdict.state for name, verdict in verdicts.items()}
+    solve = verdicts["solve"].state
     return Status(
         source=str(capture.source or ""),
-        stages=states,
+        stages={name: verdict.state for name, verdict in verdicts.items()},
         versions={name: verdict.version for name, verdict in verdicts.items()},
-        whole_solve=_whole_solve(capture, states["solve"], settings),
-        seconds={name: done["seconds"] for name, done in record["stages"].items()},
+        whole_solve=(
+            "The mask is as it was at the last solve."
+            if solve in freshness.FINISHED
+            else mask_edit.obstacle(capture, settings)
+        ),
+        seconds={name: entry["seconds"] for name, entry in record["stages"].items()},
         has_head=capture.head.is_file(),
         head_time=_time(capture.head),
         has_mask=capture.shadow_mask.is_file(),
         findings=tuple(report.findings(record)),
         interrupted=_interrupted(capture),
-        has_maps=all(path.is_file() for path in worn),
+        has_maps=all(path.is_file() for path in maps),
         maps_time=maps_time,
         render=render.name if _time(render) >= maps_time else "",
         **_sending(capture, settings),
     )
 
 
+def _unreadable(capture: Capture, reason, remedy: str) -> Problem:
+    return Problem(f"The capture folder {capture.root} cannot be read ({reason}).", remedy)
+
+
 def _verdict(capture: Capture, stage: stages.Stage, record: dict, settings) -> freshness.Verdict:
-    if stage.name not in record["stages"]:
-        # and did not end: what is there is of another run, or half new
-        begun = (capture.logs / f"{stage.name}.log").is_file()
-        return freshness.Verdict(
-            "absent" if all(capture.has(name) for name in stage.writes) and not begun else freshness.TO_DO
-        )
-    return capture.verdict(stage, settings)
+    if stage.name in record["stages"]:
+        return capture.verdict(stage, settings)
+    # a stage that began and did not end leaves outputs of another run, or incomplete ones
+    has_begun = (capture.logs / f"{stage.name}.log").is_file()
+    complete = all(capture.has(name) for name in stage.writes)
+    return freshness.Verdict("absent" if complete and not has_begun else freshness.TO_DO)
 
 
 def _sending(capture: Capture, settings) -> dict:
@@ -133,49 +138,23 @@ def _sending(capture: Capture, settings) -> dict:
     return {"sending": plan, "agreed": consent.is_given(capture, plan)}
 
 
-def _whole_solve(capture: Capture, state: str, settings) -> str:
-    return (
-        "The mask is as it was at the last solve."
-        if state in freshness.FINISHED
-        else mask_edit.obstacle(capture, settings)
-    )
-
-
 def _interrupted(capture: Capture) -> bool:
-    """Whether a stopped solve left a checkpoint, and no mask was painted since it began: it goes on from there only
-    with the masks it began with."""
+    """Return whether a stopped solve left a checkpoint that fits the masks: none was painted since it began."""
     began = _time(capture.job) or float("inf")
     checkpoint = capture.checkpoints / "solve.safetensors"
     return checkpoint.is_file() and max(map(_time, (capture.shadow_mask, capture.protect_mask))) <= began
 
 
 def _time(path: Path) -> float:
-    """When a file was last written, as the objects of the scene remember it (`st_mtime`, which nanoseconds divided by
-    1e9 miss by the last bit)."""
+    """Return a file's `st_mtime`, as the scene's objects store it; nanoseconds / 1e9 differ in the last bit."""
     try:
         return path.stat().st_mtime if path.is_file() else 0.0
     except OSError:
         return 0.0
 
 
-def _changed(path: Path) -> int:
-    """When a file or folder was last written, in nanoseconds; 0 where there is none, also where it has just been
-    replaced or taken away."""
-    try:
-        return path.stat().st_mtime_ns
-    except OSError:
-        return 0
-
-
-def _look(root: str, item) -> None:
-    capture = captures.folder(item)
-    stamp = _stamp(capture, repr(properties.job_settings(item)))
-    if root not in _known or _known[root][0] != stamp:
-        _known[root] = (stamp, look(capture, properties.settings(item)))
-
-
 def _stamp(capture: Capture, settings: str) -> tuple:
-    """What a capture's status depends on: the settings, as text, and a few file times."""
+    """Return what a capture's status depends on: the settings as text, and a few file times."""
     watched = (
         capture.json,
         capture.head,
@@ -190,12 +169,11 @@ def _stamp(capture: Capture, settings: str) -> tuple:
         *(folder / name for folder in (capture.maps, capture.maps_4k) for name in newest_maps.WORN),
         capture.renders,
     )
-    return settings, *map(_changed, watched)
+    return settings, *map(modified_ns, watched)
 
 
 def _tick() -> float:
-    """Has what changed looked at aside: hashing a new capture takes seconds, and longer while a solver takes all cores;
-    and a file server may let one wait for as much as a file's time."""
+    """Read wanted captures in threads: hashing a new one takes seconds, and a file server may delay any file time."""
     while not _found.empty():
         root, stamp, status = _found.get()
         _looking.discard(root)
@@ -212,40 +190,30 @@ def _tick() -> float:
             daemon=True,
             args=(root, repr(properties.job_settings(item)), captures.folder(item), properties.settings(item)),
         ).start()
-    _wanted.intersection_update(shown())  # the others are again when they are drawn
+    _wanted.intersection_update(shown())  # others are wanted again when they are drawn
     return INTERVAL_S
 
 
 def shown() -> set[str]:
-    """The capture folders that the windows' tabs are about."""
+    """Return the capture folders that the windows' tabs show."""
     return {captures.root(captures.active(window)) for window in bpy.context.window_manager.windows}
 
 
-def _look_aside(root: str, told: str, capture: Capture, settings) -> None:
+def _look_aside(root: str, settings_text: str, capture: Capture, settings) -> None:
     stamp: tuple = ()
     try:
-        stamp = _stamp(capture, told)
+        stamp = _stamp(capture, settings_text)
         if root in _known and _known[root][0] == stamp:
             _looking.discard(root)
             return
-        _found.put((root, stamp, look(capture, settings)))
-    except Exception as error:  # of a folder that changes under the look: the next stamp is another one
-        _found.put(
-            (
-                root,
-                stamp,
-                Status(
-                    problem=Problem(
-                        f"The capture folder {capture.root} cannot be read ({error}).",
-                        "WildCap looks again in a second.",
-                    )
-                ),
-            )
-        )
+        status = look(capture, settings)
+    except Exception as error:  # the folder changed meanwhile: the next stamp differs
+        status = Status(problem=_unreadable(capture, error, "WildCap looks again in a second."))
+    _found.put((root, stamp, status))
 
 
 def redraw() -> None:
-    """Asks the sidebars to draw again."""
+    """Redraw the sidebars."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == 'VIEW_3D':
@@ -261,5 +229,5 @@ def register():
 def unregister():
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
-    for kept in (_known, _wanted, _looking):
-        kept.clear()
+    for cache in (_known, _wanted, _looking):
+        cache.clear()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The add-on from a terminal, without a window:
+"""Command line without a window.
 
 blender --command wildcap run me.mp4 me.wildcap --quality film
 blender --command wildcap solve me.wildcap
@@ -23,8 +23,7 @@ NAME = "wildcap"
 
 @dataclass(frozen=True)
 class Command:
-    """One word after `wildcap`: `options` adds its arguments to a parser, `carry_out` does it and returns the files it
-    made, or an exit code."""
+    """Subcommand: `options` adds its arguments to a parser, `carry_out` returns the files it made, or an exit code."""
 
     name: str
     help: str
@@ -38,26 +37,26 @@ _handle = None
 
 
 def forget(leaving: tuple[Command, ...]) -> None:
-    """A room leaves, and its words with it."""
+    """Remove the subcommands of a room."""
     commands[:] = [command for command in commands if command not in leaving]
 
 
 def execute(words: list[str]) -> int:
-    """Does what the words ask for and prints the files. Returns an exit code: 0, or 1 after telling what is wrong."""
+    """Run a subcommand, print its files or its problem, and return the exit code."""
     options = parser().parse_args(words)
     try:
-        made = options.carry_out(options)
+        result = options.carry_out(options)
     except Problem as problem:
         print(f"{problem.problem} {problem.remedy}", file=sys.stderr)
         return 1
-    if isinstance(made, int):
-        return made
-    print(*made, sep="\n")
+    if isinstance(result, int):
+        return result
+    print(*result, sep="\n")
     return 0
 
 
 def parser() -> argparse.ArgumentParser:
-    """What can be asked for."""
+    """Return the parser of all subcommands."""
     whole = argparse.ArgumentParser(
         prog=f"blender --command {NAME}", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -5,48 +5,31 @@ is real, its rooms are tiny."""
 
 import json
 import os
-import socket
+import struct
 import sys
-import time
 from importlib import import_module
+from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from core.capture.capture import Capture
-from tests.fixtures import standin, tiny_chain
+from tests.fixtures import standin
+from tests.fixtures.batch_faces import alive
+from tests.fixtures.polled_jobs import follow, wait
 
 bpy = pytest.importorskip("bpy")
 
 
-@pytest.fixture
-def jobs(addon, monkeypatch, tmp_path):
-    """The add-on's jobs, over a chain of tiny rooms run by this very Python."""
-    module = addon("jobs")
-    monkeypatch.setattr(module, "ROOT", tiny_chain.build(tmp_path / "code"))
-    addon("preferences").get().python = sys.executable
-    yield module
-    for root in list(module._jobs):
-        module.cancel(root)
-    finish(module)
-    addon("preferences").get().python = ""
-
-
-def finish(jobs, condition=None, limit_s: float = 60) -> None:
-    """Polls as the timer would, to the end or until the condition holds."""
-    deadline = time.monotonic() + limit_s
-    while jobs.poll():
-        if condition is not None and condition():
-            return
-        assert time.monotonic() < deadline, "the job never ended"
-        time.sleep(0.02)
-    assert condition is None or condition()
-
-
-def a_capture(folder, name: str, mood: str = "") -> Capture:
+def make(folder, name: str = "a", mood: str = "") -> Capture:
     root = standin.make(folder / f"{name}.wildcap", solved=False)
-    (root / "mood.json").write_text(json.dumps({"solve": mood}))
+    set_mood(capture := Capture(root), mood)
     bpy.ops.wildcap.open_capture(directory=str(root))
-    return Capture(root)
+    return capture
+
+
+def set_mood(capture: Capture, mood: str) -> None:
+    (capture.root / "mood.json").write_text(json.dumps({"solve": mood}))
 
 
 def running(capture: Capture) -> bool:
@@ -58,61 +41,51 @@ def pid_of(capture: Capture) -> int:
     return json.loads(capture.lock.read_text(encoding="utf-8"))["pid"]
 
 
-def alive(pid: int) -> bool:
-    """Whether the process runs; one that has ended but that nobody has asked after yet does not."""
-    try:
-        with open(f"/proc/{pid}/stat", encoding="ascii") as file:
-            return file.read().rsplit(") ", 1)[1][0] != "Z"
-    except (ProcessLookupError, FileNotFoundError):
-        return False
+def solve_until_progress(addon, capture: Capture) -> int:
+    """The process that solves."""
+    bpy.ops.wildcap.solve()
+    follow(addon, lambda: running(capture) and addon("jobs").of(str(capture.root)).progress is not None)
+    return pid_of(capture)
 
 
-def ends(pid: int) -> None:
-    """Its last words come a moment before its end."""
-    deadline = time.monotonic() + 10
-    while alive(pid):
-        assert time.monotonic() < deadline, "the worker outlives its job"
-        time.sleep(0.02)
+def wait_for_end(pid: int) -> None:
+    """A worker's last words come a moment before its end."""
+    wait(lambda: not alive(pid))
+
+
+def step(addon):
+    addon("status").refresh(bpy.context)
+    return addon("next_step").next_step(addon("panel").gather(bpy.context, addon("captures").active(bpy.context)))
 
 
 def test_jobs_of_several_faces_wait_in_line_and_one_can_leave_it(addon, jobs, tmp_path):
-    captures = [a_capture(tmp_path, name, "slow" if name == "a" else "") for name in "abc"]
+    captures = [make(tmp_path, name, "slow" if name == "a" else "") for name in "abc"]
     roots = [str(capture.root) for capture in captures]
-    items = {item.path: item for item in bpy.context.scene.wildcap.captures}
-    status, captures_module = addon("status"), addon("captures")
 
-    def solve(*wanted: Capture) -> None:
-        for capture in wanted:
-            captures_module.add(bpy.context, capture.root)
-            bpy.ops.wildcap.solve()
+    def choose(capture: Capture) -> None:
+        addon("captures").add(bpy.context, capture.root)
 
-    solve(*captures)
+    for capture in captures:
+        choose(capture)
+        bpy.ops.wildcap.solve()
     assert [jobs.of(root).waiting for root in roots] == [False, True, True]
-    finish(jobs, lambda: running(captures[0]))
+    follow(addon, lambda: running(captures[0]))
     assert not running(captures[1]) and jobs.stage_label(jobs.of(roots[1])) == "Waiting"
-    captures_module.add(bpy.context, captures[1].root)
-    status.refresh(bpy.context)
-    facts = addon("panel").gather(bpy.context, items[roots[1]])
-    assert "another face" in addon("next_step").next_step(facts).state
+    choose(captures[1])
+    assert "another face" in step(addon).state
     bpy.ops.wildcap.cancel()
     assert jobs.of(roots[1]) is None and jobs.of(roots[2]).waiting
     jobs.cancel(roots[0])
-    finish(jobs)
+    follow(addon)
     assert [capture.has("maps/normal.png") for capture in captures] == [False, False, True]
-    (captures[0].root / "mood.json").write_text("{}")
-    solve(captures[0], captures[1])
-    finish(jobs)
-    assert all(capture.has("maps/normal.png") for capture in captures)
 
 
 def test_a_job_goes_on_when_another_file_is_opened_and_when_everything_is_undone(addon, jobs, tmp_path):
-    capture = a_capture(tmp_path, "a", "slow")
+    capture = make(tmp_path, mood="slow")
     root = str(capture.root)
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.ed.undo_push(message="before")
-    bpy.ops.wildcap.solve()
-    finish(jobs, lambda: running(capture) and jobs.of(root).progress is not None)
-    pid = pid_of(capture)
+    pid = solve_until_progress(addon, capture)
     for _ in range(3):
         if bpy.ops.ed.undo.poll():
             bpy.ops.ed.undo()
@@ -120,165 +93,147 @@ def test_a_job_goes_on_when_another_file_is_opened_and_when_everything_is_undone
     assert jobs.of(root) is not None and alive(pid)
     bpy.ops.wm.read_homefile(use_empty=True)
     jobs.poll()
-    assert jobs.of(root) is not None and alive(pid) and len(bpy.context.scene.wildcap.captures) == 0
+    assert alive(pid) and len(bpy.context.scene.wildcap.captures) == 0
     assert [folder for folder, _ in jobs.elsewhere("")] == [root], "the tab tells of it there, too"
     bpy.ops.wildcap.open_capture(directory=root)
-    assert jobs.elsewhere(root) == []
-    assert jobs.of(addon("captures").root(addon("captures").active(bpy.context))).goal == "solve", (
-        "the tab of the capture shows it again"
-    )
+    assert jobs.elsewhere(root) == [] and jobs.of(root).goal == "solve"
     bpy.ops.scene.new(type='NEW')
-    assert jobs.of(root) is not None
     bpy.ops.wildcap.cancel(capture=root)
-    finish(jobs)
-    ends(pid)
+    follow(addon)
+    wait_for_end(pid)
 
 
 def test_a_cancelled_second_solve_is_to_be_done_though_the_maps_of_before_are_there(addon, jobs, tmp_path):
-    capture = a_capture(tmp_path, "a")
+    def state() -> str:
+        item = addon("captures").active(bpy.context)
+        addon("status").of(item)
+        addon("status").refresh(bpy.context)
+        return addon("status").of(item).stages["solve"]
+
+    capture = make(tmp_path)
     bpy.ops.wildcap.solve()
-    finish(jobs)
-    assert state_of_solve(addon) == "older", "the solver that ran is not this one's"
-    (capture.root / "mood.json").write_text(json.dumps({"solve": "slow"}))
-    bpy.ops.wildcap.solve()
-    finish(jobs, lambda: running(capture) and jobs.of(str(capture.root)).progress is not None)
-    jobs.cancel(str(capture.root))
-    finish(jobs)
-    assert capture.has("maps/normal.png") and state_of_solve(addon) == "to do"
+    follow(addon)
+    assert state() == "older", "the solver that ran is not this one's"
+    set_mood(capture, "slow")
+    solve_until_progress(addon, capture)
+    bpy.ops.wildcap.cancel()
+    follow(addon)
+    assert "Cancelled" in addon("problems").of(str(capture.root)).problem
+    assert capture.has("maps/normal.png") and state() == "to do"
 
 
-def test_a_solve_in_the_middle_of_painting_takes_the_mask_as_it_is_painted(addon, jobs, tmp_path):
-    capture = a_capture(tmp_path, "a")
+def test_a_solve_in_the_middle_of_painting_takes_the_mask_as_it_is_painted(addon, tmp_path, monkeypatch):
+    capture, mask_image = make(tmp_path), addon("paint.mask_image")
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.paint_mask()
     image = addon("paint.session").mask()
-    painted = addon("paint.mask_image").mask_values(image).copy()
+    painted = mask_image.mask_values(image).copy()
     painted[10:20, 30:40] = 1
-    addon("paint.mask_image").set_values(image, painted)
+    mask_image.set_values(image, painted)
+    monkeypatch.setattr(addon("preferences"), "require_python", lambda: Path(sys.executable))
+    monkeypatch.setattr(addon("jobs"), "start_worker", Mock())
     bpy.ops.wildcap.solve()
-    assert capture.shadow_mask.read_bytes() == addon("paint.mask_image").grey_png(painted)
-    jobs.cancel(str(capture.root))
-    finish(jobs)
+    assert capture.shadow_mask.read_bytes() == mask_image.grey_png(painted)
     bpy.ops.wildcap.finish_mask()
 
 
-def state_of_solve(addon) -> str:
-    item = addon("captures").active(bpy.context)
-    addon("status").of(item)
-    addon("status").refresh(bpy.context)
-    return addon("status").of(item).stages["solve"]
-
-
-def test_disabling_the_add_on_ends_the_worker_and_keeps_what_is_finished(addon, jobs, wildcap, tmp_path):
+def test_disabling_the_add_on_ends_the_worker(addon, jobs, wildcap, tmp_path):
     import addon_utils
 
-    capture = a_capture(tmp_path, "a", "deaf")
+    capture = make(tmp_path, mood="deaf")
     bpy.ops.wildcap.solve()
-    finish(jobs, lambda: running(capture))
+    follow(addon, lambda: running(capture))
     pid = pid_of(capture)
     addon_utils.disable(wildcap, default_set=True)
     addon_utils.enable(wildcap, default_set=True)  # at once: without it no other test could run
-    ends(pid)
-    assert capture.texture.is_file()
+    wait_for_end(pid)
 
 
-def test_a_killed_worker_is_a_problem_with_a_remedy_and_the_lock_is_taken_over(addon, jobs, tmp_path):
-    capture = a_capture(tmp_path, "a", "slow")
+def test_a_job_that_fails_or_is_killed_is_a_problem_with_a_remedy_and_the_next_takes_over(addon, jobs, tmp_path):
+    capture, problems = make(tmp_path, mood="finding"), addon("problems")
     bpy.ops.wildcap.solve()
-    finish(jobs, lambda: running(capture) and jobs.of(str(capture.root)).progress is not None)
-    os.kill(pid_of(capture), 9)
-    finish(jobs)
-    problem = addon("problems").of(str(capture.root))
-    assert "killed" in problem.problem and "run again" in problem.remedy
-    (capture.root / "mood.json").write_text("{}")
+    assert not bpy.ops.wildcap.solve.poll(), "one job per capture"
+    follow(addon)
+    assert problems.of(str(capture.root)).problem == "The face is not there."
+    set_mood(capture, "slow")
+    os.kill(solve_until_progress(addon, capture), 9)
+    follow(addon)
+    assert "killed" in problems.of(str(capture.root)).problem and problems.of(str(capture.root)).remedy
+    set_mood(capture, "")
     bpy.ops.wildcap.solve()
-    finish(jobs)
-    assert addon("problems").of(str(capture.root)) is None and capture.has("maps/normal.png")
+    follow(addon)
+    assert problems.of(str(capture.root)) is None and capture.has("maps/normal.png")
 
 
-def test_a_capture_that_another_blender_works_on_is_refused_by_name(addon, jobs, tmp_path):
-    capture = a_capture(tmp_path, "a")
-    capture.lock.write_text(
-        json.dumps({"pid": os.getpid(), "host": socket.gethostname(), "since": "2026-01-01T00:00:00"})
-    )
-    with pytest.raises(RuntimeError, match=f"process {os.getpid()}"):
-        bpy.ops.wildcap.solve()
-    capture.lock.unlink()
-
-
-def test_an_interrupted_solve_is_offered_to_go_on_when_the_file_is_opened_again(addon, jobs, tmp_path):
-    capture = a_capture(tmp_path, "a")
+def test_an_interrupted_solve_is_offered_to_go_on_when_the_file_is_opened_again(addon, monkeypatch, tmp_path):
+    monkeypatch.setattr(addon("preferences"), "python", lambda: Path(sys.executable))
+    capture = make(tmp_path)
     bpy.ops.wildcap.bring_in_head()
     capture.checkpoints.mkdir()
     (capture.checkpoints / "solve.safetensors").write_bytes(b"a checkpoint")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
-    addon("status").refresh(bpy.context)
-    step = addon("next_step").next_step(addon("panel").gather(bpy.context, addon("captures").active(bpy.context)))
-    assert step.label == "Continue Solving" and step.operator == "wildcap.solve"
+    assert (step(addon).label, step(addon).operator) == ("Continue Solving", "wildcap.solve")
     capture.job.write_text("{}")
     os.utime(capture.job, (1, 1))
     # painted since: a checkpoint of another mask is of no use
-    capture.shadow_mask.write_bytes((capture.root / "shadow_mask_auto.png").read_bytes())
-    addon("status").refresh(bpy.context)
-    facts = addon("panel").gather(bpy.context, addon("captures").active(bpy.context))
-    assert addon("next_step").next_step(facts).label == "Solve"
+    capture.shadow_mask.write_bytes(capture.shadow_mask_auto.read_bytes())
+    assert step(addon).label == "Solve"
 
 
-def test_how_long_a_quality_takes_is_learned_from_the_last_solve(addon, jobs, tmp_path):
-    timings = addon("timings")
-    settings = import_module(timings.__package__.replace("wildcap_addon", "core.settings.settings"))
-    timings._rates.clear()
-    assert timings.describe_minutes("cpu") == ""
-    a_capture(tmp_path, "a")
+def test_an_installation_is_polled_like_a_job_and_sets_the_python(addon):
+    jobs, preferences = addon("jobs"), addon("preferences")
+
+    class Installation:
+        """Says what a real one says, without a download."""
+
+        running = True
+        start = staticmethod(lambda: None)
+        messages = [jobs.messages.Progress("environment", 1, 2, "Collecting torch"), jobs.messages.Done(1.0)]
+
+        def poll(self):
+            self.running = len(self.messages) > 1
+            return [self.messages.pop(0)]
+
+    jobs.start_worker("", "install", Installation(), lambda: preferences.set_python(Path(sys.executable)))
+    assert jobs.poll() and jobs.of("").progress.text == "Collecting torch"
+    assert not jobs.poll() and preferences.python() == Path(sys.executable)
+    preferences.set_python(None)
+
+
+def test_a_timer_that_fails_tells_it_and_goes_on(addon, monkeypatch):
+    jobs, problems, incoming = addon("jobs"), addon("problems"), addon("incoming")
+    with monkeypatch.context() as patched:
+        patched.setattr(jobs, "poll", lambda: 1 / 0)
+        assert jobs._tick() is None and "An error inside WildCap" in problems.of("").problem
+    monkeypatch.setattr(incoming, "waits", lambda: True)
+    for failure, words in (
+        (ZeroDivisionError(), "An error inside WildCap"),
+        (jobs.Problem("The head is damaged.", "Run it again."), "is damaged"),
+    ):
+        monkeypatch.setattr(incoming, "bring_in", Mock(side_effect=failure))
+        assert jobs._tick() == jobs.INTERVAL_S and words in problems.of("").problem
+
+
+def test_the_edited_part_can_be_solved_when_only_the_mask_changed(addon, capture, item, monkeypatch):
+    jobs, status = addon("jobs"), addon("status")
+    mask_edit = import_module(status.__package__.replace("wildcap_addon", "core.capture.mask_edit"))
+    folder = addon("captures").folder(item)
+    status.refresh(bpy.context)
+    assert "No solve" in status.of(item).whole_solve and not bpy.ops.wildcap.solve_edited.poll()
+    conditions = mask_edit.conditions(folder, addon("properties").settings(item))
+    header = json.dumps({"__metadata__": {mask_edit.FIELD: json.dumps(conditions)}}).encode()
+    folder.solved.write_bytes(struct.pack("<Q", len(header)) + header)
+    status.refresh(bpy.context)
+    assert status.of(item).whole_solve == "" and bpy.ops.wildcap.solve_edited.poll()
+    monkeypatch.setattr(addon("preferences"), "require_python", lambda: Path(sys.executable))
+    monkeypatch.setattr(jobs, "start_worker", Mock())
+    bpy.ops.wildcap.solve_edited()
+    job = json.loads(folder.job.read_text(encoding="utf-8"))
+    assert job["settings"]["edited_part"] is True and job["from"] == "solve"
     bpy.ops.wildcap.solve()
-    finish(jobs)
-    assert "Standard" in timings.describe_minutes("cpu") and timings.describe_minutes("cuda") == ""
-    standard = settings.preset("standard")
-    timings.record(standard, 240.0)
-    assert timings.minutes("standard", "cpu") == pytest.approx(4.0)
-    ratio = timings.work(settings.preset("draft")) / timings.work(standard)
-    assert timings.minutes("draft", "cpu") == pytest.approx(4.0 * ratio)
-    timings.record(settings.from_json({"edited_part": True}), 1.0)
-    assert timings.minutes("standard", "cpu") == pytest.approx(4.0), "a part is no measure"
-    timings.unregister()
-    timings.register()
-    assert timings.minutes("standard", "cpu") == pytest.approx(4.0), "it is known in the next Blender"
-    timings._file().unlink()
-    timings.register()
-    assert timings.minutes("standard", "cpu") is None
-
-
-def test_the_running_solve_is_shown_on_the_head_and_leaves_no_trace(addon, jobs, tmp_path):
-    live, head_name = addon("solve.live"), addon("head").PREVIEW
-    capture = a_capture(tmp_path, "a", "slow")
-    bpy.ops.wildcap.bring_in_head()
-    root = str(capture.root)
-    nodes = bpy.context.object.active_material.node_tree.nodes
-    shown = nodes.active.name
-    bpy.ops.wildcap.solve()
-    finish(jobs, lambda: running(capture))
-    seen = []
-    for colour in ((255, 0, 0), (0, 0, 255)):
-        capture.preview.mkdir(exist_ok=True)
-        (capture.preview / "albedo.png").write_bytes(standin.plain(colour))
-        blocks = len(bpy.data.images)
-        live.update(root)
-        assert nodes.active.name == head_name and len(bpy.data.images) == blocks, "a timer makes no data-blocks"
-        seen.append(tuple(round(v) for v in nodes.active.image.pixels[:3]))
-    assert seen == [(1, 0, 0), (0, 0, 1)]
-    bpy.ops.wildcap.paint_mask()
-    (capture.preview / "albedo.png").write_bytes(standin.plain((0, 255, 0)))
-    live.update(root)
-    kept = tuple(round(v) for v in nodes[head_name].image.pixels[:3])
-    assert kept == (0, 0, 1), "nothing is touched while somebody paints"
-    bpy.ops.wildcap.finish_mask()
-    jobs.cancel(root)
-    finish(jobs)
-    assert nodes.active.name == shown
-    for name in ("diffuse_albedo.png", "specular_albedo.png", "normal.png"):
-        capture.maps.mkdir(exist_ok=True)
-        (capture.maps / name).write_bytes(standin.plain((128, 128, 255)))
-    bpy.ops.wildcap.assemble_material()
-    assert head_name not in bpy.context.object.active_material.node_tree.nodes
-    assert not any(head_name in image.name for image in bpy.data.images)
+    job = json.loads(folder.job.read_text(encoding="utf-8"))
+    assert "edited_part" not in job["settings"], "the next solve is whole again"
+    item.seed += 1
+    status.refresh(bpy.context)
+    assert "settings changed" in status.of(item).whole_solve and not bpy.ops.wildcap.solve_edited.poll()

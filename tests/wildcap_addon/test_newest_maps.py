@@ -9,103 +9,103 @@ import pytest
 
 from core.capture import stages
 from core.capture.capture import Capture
-from core.capture.messages import Problem
 from core.capture.newest_maps import WORN, find_newest_maps
 from core.settings.settings import Settings, from_json
 from tests.fixtures import standin
 from tests.fixtures.recorded import record
+from tests.fixtures.refused import refused
 
 UPSCALE = stages.by_name("upscale")
 
 
 @pytest.fixture
-def enlarged(tmp_path) -> Capture:
+def enlarged(tmp_path, monkeypatch) -> Capture:
     """The stand-in's capture with maps at 4K whose record is that of the stage."""
+    monkeypatch.setattr("core.capture.freshness.code_key", lambda module: "")
     capture = Capture(standin.make(tmp_path / "Zoë et moi" / "head.wildcap"))
     shutil.copytree(capture.maps, capture.maps_4k)
     record(capture, UPSCALE, Settings())
     return capture
 
 
-def date(folder, seconds: float) -> None:
-    for path in folder.iterdir():
-        os.utime(path, (seconds, seconds))
+def date(capture: Capture, maps: float, maps_4k: float) -> None:
+    for folder, seconds in ((capture.maps, maps), (capture.maps_4k, maps_4k)):
+        for path in folder.iterdir():
+            os.utime(path, (seconds, seconds))
+
+
+def change(path) -> None:
+    path.write_bytes(path.read_bytes() + b" ")
 
 
 def is_at_4k(capture: Capture) -> bool:
-    found = find_newest_maps(capture)
-    assert [path.name for path in found] == list(WORN) and len({path.parent for path in found}) == 1
-    return found[0].parent == capture.maps_4k
+    maps = find_newest_maps(capture)
+    assert [path.name for path in maps] == list(WORN) and len({path.parent for path in maps}) == 1
+    return maps[0].parent == capture.maps_4k
 
 
-@pytest.mark.parametrize("solved, at_4k", [(1e9, 2e9), (2e9, 1e9), (2e9, 2e9)])
-def test_maps_at_4k_that_were_made_of_the_solved_ones_are_worn_whatever_times_files_have(enlarged, solved, at_4k):
-    date(enlarged.maps, solved), date(enlarged.maps_4k, at_4k)
+@pytest.mark.parametrize("times", [(1e9, 2e9), (2e9, 1e9), (2e9, 2e9)])
+def test_maps_at_4k_that_were_made_of_the_solved_ones_are_worn_whatever_times_files_have(enlarged, times):
+    date(enlarged, *times)
     assert is_at_4k(enlarged)
 
 
 @pytest.mark.parametrize("name", WORN)
 def test_maps_of_a_later_solve_are_worn_whatever_times_files_have(enlarged, name):
-    (enlarged.maps / name).write_bytes((enlarged.maps / name).read_bytes() + b" ")
-    date(enlarged.maps, 1e9), date(enlarged.maps_4k, 2e9)
+    change(enlarged.maps / name)
+    date(enlarged, 1e9, 2e9)
     assert not is_at_4k(enlarged)
+
+
+@pytest.mark.parametrize(
+    ("lose", "at_4k"),
+    [
+        (lambda capture: (capture.maps_4k / "normal.png").unlink(), False),
+        (lambda capture: shutil.rmtree(capture.maps), True),  # what is gone contradicts nothing
+    ],
+    ids=["an incomplete folder", "no solved maps"],
+)
+def test_a_folder_that_is_not_whole(enlarged, lose, at_4k):
+    lose(enlarged)
+    assert is_at_4k(enlarged) == at_4k
 
 
 def test_other_settings_of_the_enlarging_do_not_take_its_maps_away(enlarged):
-    assert enlarged.state(UPSCALE, Settings()) == "done"
-    assert enlarged.state(UPSCALE, from_json({"upscale": {"size": 2048}})) == "stale"
-    assert is_at_4k(enlarged)
-
-
-def test_an_incomplete_folder_is_not_worn(enlarged):
-    (enlarged.maps_4k / "normal.png").unlink()
-    assert not is_at_4k(enlarged)
-
-
-def test_solved_maps_that_are_gone_do_not_take_the_large_ones_away(enlarged):
-    shutil.rmtree(enlarged.maps)
-    assert is_at_4k(enlarged)
+    assert enlarged.state(UPSCALE, from_json({"upscale": {"size": 2048}})) == "stale" and is_at_4k(enlarged)
 
 
 def test_where_no_record_tells_the_times_do(enlarged):
     enlarged.forget(["upscale"])
-    date(enlarged.maps, 1e9), date(enlarged.maps_4k, 2e9)
-    assert is_at_4k(enlarged)
-    date(enlarged.maps, 3e9)
-    assert not is_at_4k(enlarged)
+    for times, at_4k in (((1e9, 2e9), True), ((3e9, 2e9), False)):
+        date(enlarged, *times)
+        assert is_at_4k(enlarged) == at_4k
 
 
-def test_a_capture_without_maps_names_the_solved_ones(tmp_path):
-    found = find_newest_maps(Capture(tmp_path / "new.wildcap"))
-    assert found == [tmp_path / "new.wildcap" / "maps" / name for name in WORN]
-
-
-def test_a_damaged_record_is_named(enlarged):
+def test_a_capture_without_maps_names_the_solved_ones_and_one_with_a_damaged_record_is_refused(enlarged, tmp_path):
+    new = Capture(tmp_path / "new.wildcap")
+    assert find_newest_maps(new) == [new.maps / name for name in WORN]
     enlarged.json.write_text("{", encoding="utf-8")
-    with pytest.raises(Problem, match="cannot be read"):
-        find_newest_maps(enlarged)
+    refused(lambda: find_newest_maps(enlarged), "cannot be read")
 
 
 def test_a_copied_capture_wears_its_maps_at_4k_in_blender(addon, enlarged):
     bpy = pytest.importorskip("bpy")
-    date(enlarged.maps, 3e9), date(enlarged.maps_4k, 2e9)
+    date(enlarged, 3e9, 2e9)
     bpy.ops.wildcap.open_capture(directory=str(enlarged.root))
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.assemble_material()
-    head = addon("captures").head(bpy.context, addon("captures").active(bpy.context))
+    item = addon("captures").active(bpy.context)
+    head = addon("captures").head(bpy.context, item)
 
     def shown() -> set[str]:
-        nodes = head.data.materials[0].node_tree.nodes
-        return {
-            bpy.path.native_pathsep(nodes[name].image.filepath).split(os.sep)[-2]
-            for name in ("WildCap Albedo", "WildCap Specular", "WildCap Normal")
-        }
+        images = [node.image for node in head.data.materials[0].node_tree.nodes if getattr(node, "image", None)]
+        return {bpy.path.native_pathsep(image.filepath).split(os.sep)[-2] for image in images}
 
     assert shown() == {"maps_4k"}
     addon("status")._known.clear()
     addon("status").refresh(bpy.context)
-    known = addon("status").of(addon("captures").active(bpy.context))
+    known = addon("status").of(item)
     assert known.has_maps and known.maps_time == 2e9 == head["wildcap_maps_time"]
-    (enlarged.maps / "normal.png").write_bytes((enlarged.maps / "normal.png").read_bytes() + b" ")
+    change(enlarged.maps / "normal.png")
     bpy.ops.wildcap.assemble_material()
     assert shown() == {"maps"}, "of a later solve"

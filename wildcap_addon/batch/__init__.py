@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Many faces at once: all of the list reconstructed or solved by a batch that outlives Blender, and the walk through
-the masks that wait."""
+"""Many faces at once: a batch that outlives Blender, and the walk through the masks that wait."""
 
 import bpy
 

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: reconstruct or solve all faces by a batch, open one that was planned elsewhere, and walk through its
-masks."""
+"""Operators: reconstruct or solve all faces by a batch, open one planned elsewhere, and walk through its masks."""
 
 from pathlib import Path
 
@@ -17,33 +16,42 @@ from ..base_operator import BaseOperator, FileOperator
 from . import planning, running, walking
 
 
+def _with_batch(operator) -> bool:
+    return operator.allowed(batches.current() is not None, "No batch is open: click Open Batch first")
+
+
+def _without_run(operator) -> bool:
+    return operator.allowed(not running.running(), "A batch is running: wait for it, or cancel it")
+
+
 class AllFaces(BaseOperator):
-    """Mixin: an operator that starts a batch."""
+    """Operator that starts a batch."""
 
     @classmethod
     def poll(cls, context):
         many = batches.current() is not None or len(context.scene.wildcap.captures) > 1
         return (
             cls.allowed(many, "The list has fewer than two captures: use that capture's own buttons")
-            and cls.allowed(not running.running(), "A batch is running: wait for it, or cancel it")
+            and _without_run(cls)
             and cls.allowed(not jobs.elsewhere(""), "A job is running: wait for it, or click Cancel")
         )
 
     def prepare(self, context) -> Batch:
-        """What is meant by all; a mask that is being painted is saved. Raises Problem where there is no solver, before
-        anything is written."""
+        """Return the batch of all faces, with the painted mask saved. Raises Problem, if possible before writing."""
         preferences.require_python()
-        for each in jobs.before_start:
-            each()
+        for save in jobs.before_start:
+            save()
         batch, left_out = planning.prepare(context)
         if left_out:
-            self.report({'WARNING'}, rpt_("Left out, as they have no video: {}").format(", ".join(left_out)))
+            self.report({'WARNING'}, rpt_("Left out for lack of a video: {}").format(", ".join(left_out)))
         return batch
 
 
 class WILDCAP_OT_reconstruct_all(AllFaces, bpy.types.Operator):
-    """Reconstruct every face of the list, or of the open batch, up to its shadow mask: one after the other, also when
-    Blender is closed meanwhile"""
+    """Reconstruct every face of the list, or of the open batch, up to its shadow mask.
+
+    This goes on if you close Blender.
+    """
 
     bl_idname = "wildcap.reconstruct_all"
     bl_label = "Reconstruct All"
@@ -54,8 +62,10 @@ class WILDCAP_OT_reconstruct_all(AllFaces, bpy.types.Operator):
 
 
 class WILDCAP_OT_solve_all(AllFaces, bpy.types.Operator):
-    """Solve every face that has a shadow mask, with the mask as it is now: painted, or as it was proposed. It goes on
-    when Blender is closed meanwhile"""
+    """Solve every face that has a shadow mask, painted or proposed.
+
+    This goes on if you close Blender.
+    """
 
     bl_idname = "wildcap.solve_all"
     bl_label = "Solve All"
@@ -73,7 +83,7 @@ class WILDCAP_OT_solve_all(AllFaces, bpy.types.Operator):
 
 
 class WILDCAP_OT_cancel_batch(BaseOperator, bpy.types.Operator):
-    """Stop the batch; what is finished of every face is kept, and the same button goes on from there"""
+    """Stop the batch; finished stages are kept, and the same button continues from there."""
 
     bl_idname = "wildcap.cancel_batch"
     bl_label = "Cancel Batch"
@@ -87,8 +97,7 @@ class WILDCAP_OT_cancel_batch(BaseOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_open_batch(FileOperator, bpy.types.Operator):
-    """Open the folder of a batch, also of one that was planned and run from a terminal or on a farm: its faces come
-    into the list of captures"""
+    """Open the folder of a batch, also of one from a terminal or a farm, and add its faces to the list."""
 
     bl_idname = "wildcap.open_batch"
     bl_label = "Open Batch"
@@ -115,36 +124,36 @@ class WILDCAP_OT_open_batch(FileOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_close_batch(BaseOperator, bpy.types.Operator):
-    """Take the batch off this tab; its folder and its captures stay as they are"""
+    """Remove the batch from this tab; its folder and its captures stay."""
 
     bl_idname = "wildcap.close_batch"
     bl_label = "Close Batch"
 
     @classmethod
     def poll(cls, context):
-        return cls.allowed(batches.current() is not None, "No batch is open: click Open Batch first") and cls.allowed(
-            not running.running(), "A batch is running: wait for it, or cancel it"
-        )
+        return _with_batch(cls) and _without_run(cls)
 
     def work(self, context):
         batches.close()
 
 
 class MaskWalk(BaseOperator):
-    """Mixin: an operator of the walk through the masks."""
+    """Operator of the walk through the masks."""
 
     bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
     def poll(cls, context):
-        return cls.allowed(batches.current() is not None, "No batch is open: click Open Batch first") and cls.allowed(
+        return _with_batch(cls) and cls.allowed(
             context.mode == 'OBJECT' or walking.painting(), "This works in Object Mode only, or while you paint a mask"
         )
 
 
 class WILDCAP_OT_next_mask(MaskWalk, bpy.types.Operator):
-    """Bring in the next face whose shadow mask waits to be looked at, and paint there. The mask that is being painted
-    is saved, but not accepted"""
+    """Bring in the next face whose shadow mask waits for approval, and paint it.
+
+    The mask that is being painted is saved, but not accepted.
+    """
 
     bl_idname = "wildcap.next_mask"
     bl_label = "Next Mask"
@@ -165,7 +174,7 @@ class WILDCAP_OT_next_mask(MaskWalk, bpy.types.Operator):
 
 
 class WILDCAP_OT_accept_mask(MaskWalk, bpy.types.Operator):
-    """This face is solved with its shadow mask as it is now, painted or proposed; the next one that waits comes in"""
+    """Accept this face's shadow mask as it is, painted or proposed, and bring in the next face that waits."""
 
     bl_idname = "wildcap.accept_mask"
     bl_label = "Accept and Next"
@@ -181,9 +190,9 @@ class WILDCAP_OT_accept_mask(MaskWalk, bpy.types.Operator):
         root = captures.root(captures.require(context))
         walking.leave(root)
         batches.accept(batches.view().face(root))
-        following = walking.following(root)
-        if following is not None:
-            walking.go(context, following)
+        next_face = walking.following(root)
+        if next_face is not None:
+            walking.go(context, next_face)
         else:
             self.report({'INFO'}, rpt_("All masks have been looked at: click Solve All"))
 

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The record of a batch of the captures that the scene lists, which stay where they are, with their settings as the
-panels have them."""
+"""Record of a batch of the listed captures, which stay in their folders, with the panels' settings."""
 
 import itertools
 import time
@@ -14,41 +13,35 @@ from ...core.capture.messages import Problem
 from .. import batches, captures, preferences, properties
 
 FOLDER = "batches"
-"""Where they lie, among the captures: a folder for each, named by the time."""
+"""Folder of batches among the captures; each has a folder named by the time."""
 
 
 def prepare(context) -> tuple[Batch, list[str]]:
-    """The batch that is meant by "all", and the names of captures that it leaves out because there is no video to begin
-    with. Raises Problem.
+    """Return the batch of all faces, and the names of captures that it leaves out for lack of a video.
 
-    The open one, as it is, if it was planned from a table. Else one of the scene's list: the open one anew where it has
-    these very captures, or another.
+    It is the open batch if that was planned from a table. Otherwise it has the scene's list, and replaces the record of
+    the open batch if that has the same captures. Raises Problem if no capture has a video.
     """
-    opened = read_batch(batches.current()) if batches.current() is not None else None
-    if opened is not None and is_planned(opened):
-        return opened, []
+    open_batch = read_batch(batches.current()) if batches.current() is not None else None
+    # captures in the batch's own folder: it was planned from a table, which decides on faces and settings
+    if open_batch is not None and any(face.root.parent == open_batch.root for face in open_batch.faces):
+        return open_batch, []
     faces, left_out = _list_faces(context)
     if not faces:
         raise Problem(
             "No capture of the list has a video or photographs that it could be made from.",
             "Choose videos: each becomes a capture of the list.",
         )
-    same = opened is not None and {face.root for face in opened.faces} == {face.root for face in faces}
-    batch = Batch(
-        opened.root if same else _make_folder(preferences.captures_folder() / FOLDER), tuple(faces), gate=GATES[1]
-    )
+    same = open_batch is not None and {face.root for face in open_batch.faces} == {face.root for face in faces}
+    root = open_batch.root if same else _make_folder(preferences.captures_folder() / FOLDER)
+    batch = Batch(root, tuple(faces), gate=GATES[1])
     write_batch(batch)
     batches.choose(batch.root)
     return batch, left_out
 
 
-def is_planned(batch: Batch) -> bool:
-    """Whether a table says who is in it, and by which settings: such a batch has captures in its own folder."""
-    return any(face.root.parent == batch.root for face in batch.faces)
-
-
 def _list_faces(context) -> tuple[list[BatchFace], list[str]]:
-    faces, left_out, taken = [], [], set()
+    faces, left_out, names = [], [], set()
     for item in context.scene.wildcap.captures:
         capture = captures.folder(item)
         try:
@@ -58,29 +51,23 @@ def _list_faces(context) -> tuple[list[BatchFace], list[str]]:
         if source is None:
             left_out.append(item.name)
         else:
-            faces.append(
-                BatchFace(
-                    _name(capture.root.stem, taken), source, capture.root, item.quality, properties.job_settings(item)
-                )
-            )
+            name = _unique_name(capture.root.stem, names)
+            faces.append(BatchFace(name, source, capture.root, item.quality, properties.job_settings(item)))
     return faces, left_out
 
 
-def _name(base: str, taken: set[str]) -> str:
-    """A name of its own for a face; two captures in two folders may have the same."""
-    # on a command line a hyphen would begin an option
-    base = base.lstrip("-") if plain_name(base.lstrip("-")) else "face"
-    name = next(
-        name
-        for number in itertools.count(1)
-        if (name := base if number == 1 else f"{base}_{number}").casefold() not in taken
-    )
-    taken.add(name.casefold())
+def _unique_name(base: str, names: set[str]) -> str:
+    """Return a face's name that is not among `names`, and add it: two captures in two folders may have the same."""
+    base = base.lstrip("-")  # on a command line a hyphen would begin an option
+    base = base if plain_name(base) else "face"
+    candidates = (base if number == 1 else f"{base}_{number}" for number in itertools.count(1))
+    name = next(name for name in candidates if name.casefold() not in names)
+    names.add(name.casefold())
     return name
 
 
 def _make_folder(parent: Path) -> Path:
-    """A new folder, never one that is there. Raises Problem where none can be made."""
+    """Make a new folder, and return it. Raises Problem if it cannot."""
     stamp = time.strftime("%Y-%m-%d_%H-%M-%S")
     for number in itertools.count(1):
         folder = parent / (stamp if number == 1 else f"{stamp}_{number}")

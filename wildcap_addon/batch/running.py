@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The process that runs a batch: started here, apart from Blender, which may close meanwhile; asked to stop by a file;
-listened to through what it writes."""
+"""Process that runs a batch: independent of Blender, stopped by a file, observed through the files it writes."""
 
 import contextlib
 import os
@@ -12,7 +11,7 @@ import bpy
 
 from ...core.batch.local import ask_to_stop
 from ...core.batch.record import Batch
-from ...core.capture import switchlight_api, unforeseen
+from ...core.capture import switchlight_api
 from ...core.capture.files import storage_problem
 from ...core.capture.messages import Problem
 from .. import batches, captures, incoming, jobs, preferences, problems, status
@@ -20,18 +19,17 @@ from .. import batches, captures, incoming, jobs, preferences, problems, status
 INTERVAL_S = 0.5
 LOG = "run.log"
 NICE_VALUE = 10
-"""Nice value of a batch, to which that of its workers is added: what the artist waits for comes first, a job of
-Blender's own among it."""
+"""Nice value of a batch, to which that of its workers is added: the artist's own jobs come first."""
 SUMMARY = re.compile(r"\d+ faces?: ")
-"""How the last line of a run that went to its end begins."""
-_process: subprocess.Popen | None = None  # of the batch that was started last, in this session
+"""Beginning of the last line of a complete run."""
+_process: subprocess.Popen | None = None  # of the batch that this session started last
 _batch: Batch | None = None
 _stopping = False
-_worked = ""  # the active capture, where the batch had it in hand a moment ago
+_worked = ""  # the active capture, if the batch was working on it at the last look
 
 
 def running() -> bool:
-    """Whether the open batch is being run, here or elsewhere."""
+    """Return whether the open batch is running, here or elsewhere."""
     return _process is not None or bool(batches.view().runner)
 
 
@@ -40,24 +38,24 @@ def started_here() -> bool:
 
 
 def start(batch: Batch, *words: str) -> None:
-    """Runs `python -m core batch WORDS`. Raises Problem when it cannot be started."""
+    """Run `python -m core batch WORDS`. Raises Problem if it cannot start."""
     global _process, _batch, _stopping
     python = preferences.require_python()
     log = batch.root / LOG
     command = [str(python), "-E", "-s", "-B", "-X", "utf8", "-m", "core", "batch", *words]
     try:
-        told = open(log, "ab")
+        output = open(log, "ab")
     except OSError as error:
         raise storage_problem(error, log) from error
-    with told:
+    with output:
         try:
             _process = subprocess.Popen(
                 command,
                 cwd=jobs.ROOT,
                 env=_environment(batch),
                 stdin=subprocess.DEVNULL,
-                stdout=told,
-                stderr=told,
+                stdout=output,
+                stderr=output,
                 **_apart(),
             )
         except OSError as error:
@@ -73,16 +71,14 @@ def start(batch: Batch, *words: str) -> None:
 
 
 def cancel() -> None:
-    """Asks who runs the open batch to stop; what was finished is kept. Raises Problem where its folder cannot be
-    written."""
+    """Stop the open batch; finished stages are kept. Raises Problem if its folder cannot be written."""
     global _stopping
     _stopping = True
     _ask_to_stop()
 
 
 def poll() -> None:
-    """Tells how the process ended that was started here, and asks one that had not begun to listen once more to
-    stop."""
+    """Show how the process ended, and repeat a request to stop that came before it listened."""
     global _process, _stopping
     if _process is not None and _process.poll() is not None:
         code, _process = _process.returncode, None
@@ -104,8 +100,7 @@ def _ask_to_stop() -> None:
 
 
 def _problem_of(code: int) -> Problem | None:
-    """Why a run did not go to its end, by the last lines that it wrote; None where it did: what stopped single faces
-    stands in them."""
+    """Return why a run failed, from the last lines of its log; None for a complete run, whatever stopped its faces."""
     log = _batch.root / LOG
     try:
         problem, remedy = (["", "", *log.read_text(encoding="utf-8", errors="replace").strip().splitlines()])[-2:]
@@ -113,7 +108,7 @@ def _problem_of(code: int) -> Problem | None:
         problem, remedy = "", ""
     if SUMMARY.match(remedy):
         return None
-    if code in (1, 2) and problem:  # as the command line tells a Problem
+    if code in (1, 2) and problem:  # the command line's format of a Problem
         return Problem(problem, remedy)
     return Problem(
         f"The batch ended unexpectedly (exit code {code}).",
@@ -122,38 +117,33 @@ def _problem_of(code: int) -> Problem | None:
 
 
 def _environment(batch: Batch) -> dict[str, str]:
-    """Blender's own, with the key of a paid service for those alone who need it."""
-    paid = next((face for face in batch.faces if face.chosen().delight.delighter == "switchlight"), None)
-    return {
-        **switchlight_api.environment_without_key(),
-        **preferences.worker_environment("switchlight" if paid else ""),
-    }
+    """Return Blender's environment, with the key of a paid service only if a face needs it."""
+    paid = any(face.chosen().delight.delighter == "switchlight" for face in batch.faces)
+    key = preferences.worker_environment("switchlight" if paid else "")
+    return {**switchlight_api.environment_without_key(), **key}
 
 
 def _apart() -> dict:
-    """Popen arguments: a process that does not end with Blender, its terminal or its session."""
-    if os.name == "nt":
-        return {
-            "creationflags": subprocess.DETACHED_PROCESS
-            | subprocess.BELOW_NORMAL_PRIORITY_CLASS
-            | subprocess.CREATE_NEW_PROCESS_GROUP
-        }
-    return {"start_new_session": True}
+    """Return Popen arguments of a process that outlives Blender, its terminal and its session."""
+    if os.name != "nt":
+        return {"start_new_session": True}
+    flags = subprocess.DETACHED_PROCESS | subprocess.BELOW_NORMAL_PRIORITY_CLASS | subprocess.CREATE_NEW_PROCESS_GROUP
+    return {"creationflags": flags}
 
 
 def _tick() -> float:
     global _worked
     try:
         poll()
-        changed = batches.poll()
+        has_news = batches.poll()
         root = captures.root(captures.active(bpy.context))
         before, _worked = _worked, root if batches.works_on(root) else ""
         if before and before == root != _worked:
             incoming.bring_in({root: "reconstruct"})
-    except Exception as error:  # nobody is above a timer: without this, Blender would drop it and the tab stand still
-        problems.show("", unforeseen.explain(error, "listening to the batch"))
-        changed = True
-    if changed:
+    except Exception as error:  # Blender would drop the timer, and the tab would stand still
+        problems.show_error("", error, "listening to the batch")
+        has_news = True
+    if has_news:
         status.redraw()
     return INTERVAL_S
 
@@ -163,7 +153,7 @@ def register():
 
 
 def unregister():
-    """Also when Blender closes: the batch goes on."""
+    """Forget the process; the batch goes on, also when Blender closes."""
     global _process, _batch, _stopping, _worked
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)

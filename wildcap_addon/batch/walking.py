@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The walk through a batch's masks: which comes next, and how its face comes into the scene and the one before steps
-aside."""
+"""Walk through a batch's masks: the next face comes into the scene, the previous one is put aside."""
 
 from pathlib import Path
 
@@ -16,7 +15,7 @@ def painting() -> bool:
 
 
 def following(root: str) -> BatchFace | None:
-    """The face whose mask waits next after that of the capture `root`, round the batch; None where no other waits."""
+    """Return the face whose mask waits next after the capture `root`, wrapping around; None if no other waits."""
     waiting, known = batches.waiting(), batches.view()
     others = [face for face in waiting if str(face.root) != root]
     order = [str(face.root) for face in known.batch.faces] if known.batch else []
@@ -25,14 +24,13 @@ def following(root: str) -> BatchFace | None:
 
 
 def leave(root: str) -> None:
-    """Saves a mask that is being painted, and ends the painting. Raises Problem."""
+    """Save the mask that is being painted, and end the painting. Raises Problem if it cannot."""
     if painting():
         _click(bpy.ops.wildcap.finish_mask, root)
 
 
 def go(context, face: BatchFace) -> None:
-    """Brings a face in, alone, and begins to paint its mask. Raises Problem, as the clicks do that an artist would do
-    it by."""
+    """Bring a face in, alone, and begin to paint its mask. Raises the Problem of the operators involved."""
     before = captures.active(context)
     leave(captures.root(before))
     if before is not None and captures.root(before) != str(face.root):
@@ -47,7 +45,7 @@ def go(context, face: BatchFace) -> None:
 
 
 def list_face(context, face: BatchFace):
-    """The face's item of the scene's list, now the active one; one that is new to it has the batch's settings."""
+    """Return the face's item of the scene's list, now the active one; a new item gets the batch's settings."""
     known = {captures.root(item) for item in context.scene.wildcap.captures}
     item = captures.add(context, face.root)
     if str(face.root) not in known:
@@ -57,25 +55,20 @@ def list_face(context, face: BatchFace):
 
 
 def _put_aside(context, item) -> None:
-    """Hides a face's head until its row is clicked, and gives the memory of its pictures back: two hundred faces are
-    more than a machine holds."""
+    """Hide a face's head until its row is clicked, and free its pictures: memory does not hold hundreds of faces."""
     obj = captures.head(context, item)
     if obj is None or obj.name not in context.view_layer.objects:
         return
     captures.put_aside(obj)
     folder = captures.folder(item).root
     for image in bpy.data.images:
-        if (
-            image.source == 'FILE'
-            and not image.is_dirty
-            and not image.packed_file
-            and Path(bpy.path.abspath(image.filepath)).is_relative_to(folder)
-        ):
+        stored = image.source == 'FILE' and not image.is_dirty and not image.packed_file
+        if stored and Path(bpy.path.abspath(image.filepath)).is_relative_to(folder):
             image.buffers_free()
 
 
 def _click(operator, root: str) -> None:
-    """Runs another room's operator. Raises the Problem that it tells of."""
+    """Run another room's operator. Raises its Problem."""
     problems.clear(root)
     try:
         operator()

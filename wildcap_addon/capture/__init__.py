@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which face: a new capture from a video, one that exists, or the sample head."""
+"""Choice of the face: a new capture from a video, an existing one, or the sample head."""
 
 import bpy
 

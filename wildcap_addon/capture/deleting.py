@@ -1,24 +1,30 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operator: delete a face from the disk, after a list of all that goes and all that stays."""
+"""Operator that deletes a face from the disk, after listing what is deleted and what stays."""
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.capture import deletion
-from ...core.capture.capture import Capture
 from ...core.capture.messages import Problem
-from ...core.worker.background import BackgroundTask
 from .. import asking, batches, captures, jobs
 from ..base_operator import Dialog
 
 
 class WILDCAP_OT_delete_face(Dialog, bpy.types.Operator):
-    """Delete all that WildCap wrote of this face, renders and exports among it: first you are told what goes. Files
-    that you added or changed stay"""
+    """Delete everything that WildCap wrote for this face, including renders and exports.
+
+    A dialog lists it first. Files that you added or changed stay.
+    """
 
     bl_idname = "wildcap.delete_face"
     bl_label = "Delete Face"
+
+    root: bpy.props.StringProperty(
+        name="Capture",
+        options={'HIDDEN', 'SKIP_SAVE'},
+        description="Folder of the face that the dialog was opened for; empty: the active one",
+    )
 
     @classmethod
     def poll(cls, context):
@@ -39,27 +45,21 @@ class WILDCAP_OT_delete_face(Dialog, bpy.types.Operator):
     def tell() -> tuple[str, ...] | None:
         capture = captures.folder(captures.require(bpy.context))
         key = ("deletion", str(capture.root))
-        removal = asking.answer(key)
-        asking.forget(key)  # whoever closes the dialog and comes back is told what is there then
+        removal = asking.find_answer(
+            key,
+            "looking at every file of the face",
+            lambda task: deletion.plan(capture),
+            "delete_face",
+            lambda: captures.root(captures.active(bpy.context)) == str(capture.root),
+        )
         if removal is None:
-            asking.find_answer(
-                key,
-                lambda task: look_at(task, capture),
-                "delete_face",
-                lambda: captures.root(captures.active(bpy.context)) == str(capture.root),
-            )
             return None
+        asking.forget(key)  # the next dialog lists what is there then
         return (
             capture.root.name,
             *deletion.lines(removal, iface_),
             "A head in the scene stays as a mesh and loses its maps: deliver it first to keep them.",
         )
-
-    root: bpy.props.StringProperty(
-        name="Capture",
-        options={'HIDDEN', 'SKIP_SAVE'},
-        description="Folder of the face that was asked for; empty: the active one",
-    )
 
     def invoke(self, context, event):
         self.root = captures.root(captures.active(context))
@@ -72,28 +72,17 @@ class WILDCAP_OT_delete_face(Dialog, bpy.types.Operator):
                 "Another face is selected now, not the one that you wanted to delete.",
                 "Select that one, and click Delete Face again.",
             )
-        jobs.start_worker(
-            "", "ask", BackgroundTask("setup", lambda task: delete(task, capture)), lambda: forget(str(capture.root))
+        asking.run(
+            "deleting the face", lambda task: deletion.delete(capture), lambda _: remove_from_lists(str(capture.root))
         )
 
 
-def look_at(task: BackgroundTask, capture: Capture) -> deletion.Deletion:
-    task.say(0, 1, "looking at every file of the face")
-    return deletion.plan(capture)
-
-
-def delete(task: BackgroundTask, capture: Capture) -> deletion.Deletion:
-    task.say(0, 1, "deleting the face")
-    return deletion.delete(capture)
-
-
-def forget(root: str) -> None:
-    """Takes the capture off the lists of all scenes."""
+def remove_from_lists(root: str) -> None:
+    """Remove a capture from the lists of all scenes."""
     for scene in bpy.data.scenes:
-        props = scene.wildcap
-        for index in reversed([i for i, item in enumerate(props.captures) if captures.root(item) == root]):
-            props.captures.remove(index)
-            props.active_index = max(0, min(props.active_index, len(props.captures) - 1))
+        items = scene.wildcap.captures
+        for index in reversed([i for i, item in enumerate(items) if captures.root(item) == root]):
+            captures.remove(scene.wildcap, index, scene.wildcap.active_index)
 
 
 CLASSES = (WILDCAP_OT_delete_face,)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators on the list of captures: open a folder, find one that was moved, take one off the list, show its report."""
+"""Operators on the list of captures: open a folder, find one that was moved, remove one, show its report."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from ..base_operator import CaptureOperator, FileOperator
 
 
 class WILDCAP_OT_open_capture(FileOperator, bpy.types.Operator):
-    """Open a capture folder that exists"""
+    """Open an existing capture folder."""
 
     bl_idname = "wildcap.open_capture"
     bl_label = "Open Capture"
@@ -23,16 +23,17 @@ class WILDCAP_OT_open_capture(FileOperator, bpy.types.Operator):
 
     def work(self, context):
         root = Path(bpy.path.abspath(self.directory)).absolute()
-        capture = Capture(root)
-        if not capture.json.is_file() and not capture.head.is_file():
+        if not links.is_capture(root):
             raise Problem(f"{root} is not a capture.", "Choose a folder that ends in .wildcap.")
-        capture.read()  # refuses a damaged or newer one
+        Capture(root).read()  # refuses a damaged or newer one
         captures.add(context, root)
 
 
 class WILDCAP_OT_locate_capture(FileOperator, CaptureOperator, bpy.types.Operator):
-    """Find the folder of a capture that was moved: beside the .blend, among your captures, or where you say; others
-    that moved along are found, too"""
+    """Find the folder of a capture that was moved: beside the .blend, among your captures, or where you choose.
+
+    Others that were moved with it are found as well.
+    """
 
     bl_idname = "wildcap.locate_capture"
     bl_label = "Locate Capture"
@@ -53,17 +54,17 @@ class WILDCAP_OT_locate_capture(FileOperator, CaptureOperator, bpy.types.Operato
             raise Problem(
                 f"{name} is where it was.", "To work on another copy of it, click Locate Capture and choose its folder."
             )
-        chosen = Path(bpy.path.abspath(self.directory)).absolute() if self.directory else links.find(item)
-        if chosen is None:
+        folder = Path(bpy.path.abspath(self.directory)).absolute() if self.directory else links.find(item)
+        if folder is None:
             raise Problem(
                 f"{name} is neither beside this .blend nor among your captures.",
                 "Click Locate Capture and choose the folder it is in now.",
             )
-        place = next((path for path in (chosen, chosen / name) if links.is_capture(path)), None)
+        place = next((path for path in (folder, folder / name) if links.is_capture(path)), None)
         if place is None:
             raise Problem(
-                f"{chosen} is not a capture, and holds no {name}.",
-                "Choose the folder that ends in .wildcap, or the one it lies in.",
+                f"{folder} is not a capture folder, and contains no {name}.",
+                "Choose the folder that ends in .wildcap, or its parent folder.",
             )
         Capture(place).read()  # refuses a damaged or newer one
         links.move(item, place)
@@ -73,22 +74,20 @@ class WILDCAP_OT_locate_capture(FileOperator, CaptureOperator, bpy.types.Operato
 
 
 class WILDCAP_OT_close_capture(CaptureOperator, bpy.types.Operator):
-    """Take the capture off this list; its folder stays"""
+    """Remove the capture from this list; its folder stays."""
 
     bl_idname = "wildcap.close_capture"
     bl_label = "Close Capture"
     bl_options = {'REGISTER', 'UNDO'}
 
     def work(self, context):
-        props = context.scene.wildcap
-        item = captures.require(context)
-        index = next(i for i, other in enumerate(props.captures) if other == item)
-        props.captures.remove(index)
-        props.active_index = max(0, min(index, len(props.captures) - 1))
+        items = context.scene.wildcap.captures
+        index = list(items).index(captures.require(context))
+        captures.remove(context.scene.wildcap, index, index)
 
 
 class WILDCAP_OT_open_report(CaptureOperator, bpy.types.Operator):
-    """Open the report in the browser: a picture and the figures of every stage, and what is wrong with the video"""
+    """Open the report in the browser: pictures and figures of every stage, and problems of the video."""
 
     bl_idname = "wildcap.open_report"
     bl_label = "Open Report"

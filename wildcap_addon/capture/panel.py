@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel: the captures of this scene."""
+"""Panels: the captures of this scene, and the frames of the active one."""
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -12,16 +12,9 @@ from . import strip
 
 class WILDCAP_UL_captures(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_property):
-        # the active head decides
-        """A capture's name, and how far a batch has come with it.
-
-        Parameters
-        ----------
-        context, layout, data, item, icon, active_data, active_property : as Blender gives them; `item` is the capture's
-        """
-        layout.prop(
-            item, "name", text="", emboss=False, icon='CHECKMARK' if item == captures.active(context) else 'USER'
-        )
+        """Draw a capture's name, a mark on the one that the active head selects, and its state in the batch."""
+        icon = 'CHECKMARK' if item == captures.active(context) else 'USER'
+        layout.prop(item, "name", text="", emboss=False, icon=icon)
         face_state = batches.state_of(captures.root(item))
         if face_state is not None:
             layout.label(text="", icon=batches.ICONS[face_state.state])
@@ -44,7 +37,7 @@ class WILDCAP_PT_capture(FoldedPanel, bpy.types.Panel):
         item = captures.active(context)
         if item is not None:
             row = layout.row()
-            row.enabled = False  # to be read: Locate moves the link, and what hangs on it
+            row.enabled = False  # only Locate may change the link, as other paths depend on it
             row.prop(item, "path", text="")
             row = layout.row(align=True)
             row.operator("wildcap.open_report", icon='URL')
@@ -57,8 +50,6 @@ class WILDCAP_PT_capture(FoldedPanel, bpy.types.Panel):
 
 
 class WILDCAP_PT_frames(CapturePanel, bpy.types.Panel):
-    """The strip of frames."""
-
     bl_label = "Frames"
     bl_order = 11
 
@@ -66,7 +57,7 @@ class WILDCAP_PT_frames(CapturePanel, bpy.types.Panel):
         layout = self.layout
         frame_strip = strip.of(captures.active(context))
         if frame_strip is None:
-            layout.label(text="No frames yet: they are taken from the video by Reconstruct", icon='INFO')
+            layout.label(text="No frames yet: Reconstruct takes them from the video", icon='INFO')
             return
         counts = iface_("{} frames, {} in the texture").format(frame_strip.count, frame_strip.used)
         blurred = iface_(", {} blurred").format(frame_strip.blurred) if frame_strip.blurred else ""

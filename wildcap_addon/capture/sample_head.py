@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sample head, copied to where the artist may write, and shown; needs no solver."""
+"""Sample head, copied to the artist's captures and shown; needs no solver."""
 
 import bpy
 
@@ -11,7 +11,7 @@ from ..base_operator import BaseOperator
 
 
 class WILDCAP_OT_open_sample_head(BaseOperator, bpy.types.Operator):
-    """Copy the finished sample head to your captures and show it; needs no solver"""
+    """Copy the finished sample head to your captures and show it; needs no solver."""
 
     bl_idname = "wildcap.open_sample_head"
     bl_label = "Open Sample Head"
@@ -23,7 +23,7 @@ class WILDCAP_OT_open_sample_head(BaseOperator, bpy.types.Operator):
         if context.mode != 'OBJECT':
             bpy.ops.object.mode_set(mode='OBJECT')
         bpy.ops.wildcap.bring_in_head()
-        # an artist's copy of it may be on its way to other maps
+        # an artist's copy may be without maps until its next solve
         if all(path.is_file() for path in find_newest_maps(capture)):
             bpy.ops.wildcap.assemble_material()
 

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scene's cameras as the JSON that the setting `cameras.import_from` reads
-(core/stages/cameras/importers/blender_cameras.py says its layout).
+"""Cameras of the scene as JSON for the setting `cameras.import_from`.
 
-Not a button: `write_cameras(bpy.context.scene, "cameras.json")` from Blender's console or a script.
+core/stages/cameras/importers/blender_cameras.py documents the layout. Not a button:
+`write_cameras(bpy.context.scene, "cameras.json")` from Blender's console or a script.
 """
 
 from pathlib import Path
@@ -14,9 +14,11 @@ from ...core.capture.files import write_json
 
 
 def write_cameras(scene: bpy.types.Scene, path: str) -> int:
-    """Each camera under its object's name, which is to be its photograph's; or, where there is one camera alone and it
-    moves, one entry per frame of the scene, numbered as the video's from 0. Pictures have the scene's resolution and
-    square pixels. Gives how many were written."""
+    """Write the scene's cameras, and return how many.
+
+    Each has its object's name, which must be its photograph's; a single animated camera instead has an entry per frame
+    of the scene, numbered from 0 like the video's. Pictures have the scene's resolution and square pixels.
+    """
     width, height = (
         round(side * scene.render.resolution_percentage / 100)
         for side in (scene.render.resolution_x, scene.render.resolution_y)
@@ -36,8 +38,11 @@ def write_cameras(scene: bpy.types.Scene, path: str) -> int:
 
 
 def _entry(camera: bpy.types.Object, width: int, height: int) -> dict:
-    """The sensor's width is that of the picture's longer side where its fit is automatic; the lens's shift is a share
-    of the same side."""
+    """Return a camera's matrix, focal length and principal point.
+
+    With an automatic fit the sensor's width belongs to the picture's longer side; the lens's shift is a share of the
+    same side.
+    """
     lens = camera.data
     across = lens.sensor_fit == 'HORIZONTAL' or (lens.sensor_fit == 'AUTO' and width >= height)
     side = width if across else height

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The video or the photographs of a face: chosen in the file browser, or dropped on a 3D view that shows the WildCap
-tab."""
+"""Video or photographs of a face: chosen in the file browser, or dropped on a 3D view with the WildCap tab."""
 
 import re
 from pathlib import Path
@@ -18,14 +17,16 @@ from ..base_panel import WildcapPanel
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm")
 PHOTOGRAPHS = (*hashes.PHOTOGRAPHS, ".dng", ".avif")
-"""What the stage frames reads, and what it explains how to convert."""
+"""Formats that the stage frames reads, or explains how to convert."""
 WIDTH_PX = 240
-"""Of the file browser's sidebar, pixels."""
+"""Width of the file browser's sidebar, pixels."""
 
 
 class WILDCAP_OT_choose_video(FileOperator, bpy.types.Operator):
-    """Choose the video of a face, or any one of its photographs: all in that folder are used. A capture folder is made
-    for it"""
+    """Choose the video of a face, or one of its photographs: all in that folder are used.
+
+    A capture folder is made for it.
+    """
 
     bl_idname = "wildcap.choose_video"
     bl_label = "Choose Video"
@@ -44,28 +45,30 @@ class WILDCAP_OT_choose_video(FileOperator, bpy.types.Operator):
         return super().invoke(context, event)
 
     def draw(self, context):
-        """Beside the file browser."""
+        """Draw the capture's place beside the file browser."""
         folder = preferences.captures_folder()
         problems.draw_text(self.layout, iface_("The capture goes to {}.").format(folder), WIDTH_PX)
         if not bpy.data.filepath and folder == preferences.captures_default():
-            told = (
-                "No cloud copies that folder. Another one is chosen in the preferences, and a saved .blend has its "
-                "captures beside it."
+            text = (
+                "No cloud copies that folder. Choose another one in the preferences; captures of a saved .blend are "
+                "stored beside it."
             )
-            problems.draw_text(self.layout, told, WIDTH_PX)
+            problems.draw_text(self.layout, text, WIDTH_PX)
 
     def work(self, context):
         folder = Path(bpy.path.abspath(self.directory))
-        chosen = [folder / file.name for file in self.files if file.name] if self.directory else []
-        for source in sources(chosen or [Path(bpy.path.abspath(self.filepath or self.directory))]):
+        paths = [folder / file.name for file in self.files if file.name] if self.directory else []
+        for source in sources(paths or [Path(bpy.path.abspath(self.filepath or self.directory))]):
             capture = Capture(new_folder(preferences.captures_folder(), source))
             capture.set_source(source)
             captures.add(context, capture.root)
 
 
 class WILDCAP_FH_source(bpy.types.FileHandler):
-    """Takes what is dropped on a 3D view while its sidebar shows the WildCap tab. Blender then asks whether a reference
-    image was meant."""
+    """Handler of files dropped on a 3D view whose sidebar shows the WildCap tab.
+
+    For pictures Blender then asks whether a reference image was meant.
+    """
 
     bl_idname = "WILDCAP_FH_source"
     bl_label = "Face for WildCap"
@@ -82,11 +85,10 @@ class WILDCAP_FH_source(bpy.types.FileHandler):
         )
 
 
-def sources(chosen: list[Path]) -> list[Path]:
-    """What was meant by some files: each video by itself, and for photographs the folder that they lie in. Raises
-    Problem where there is nothing to see."""
+def sources(files: list[Path]) -> list[Path]:
+    """Return the sources among chosen files: each video, and the folders of photographs. Raises Problem for others."""
     paths = []
-    for path in chosen:
+    for path in files:
         if not path.exists() or path == Path():
             raise Problem(f"There is no file or folder {path}.", "Choose a video, or a folder of photographs.")
         if path.is_file() and path.suffix.lower() in PHOTOGRAPHS:
@@ -103,15 +105,14 @@ def sources(chosen: list[Path]) -> list[Path]:
 
 
 def new_folder(parent: Path, source: Path) -> Path:
-    """parent/NAME.wildcap for a source; the same source finds its folder again, another one of the same name gets a
-    number."""
+    """Return parent/NAME.wildcap of a source: its existing folder, or a new one, numbered if the name is taken."""
     name = re.sub(r'[<>:"/\\|?*\x00-\x1f]', "_", source.stem if source.is_file() else source.name).strip(" .") or "face"
     for number in range(1, 1000):
         folder = parent / (f"{name}.wildcap" if number == 1 else f"{name}_{number}.wildcap")
         if not folder.exists() or (Capture(folder).json.is_file() and Capture(folder).source == source):
             return folder
     raise Problem(
-        f"{parent} holds a thousand captures named {name}.", "Choose another captures folder in the preferences."
+        f"{parent} contains a thousand captures named {name}.", "Choose another captures folder in the preferences."
     )
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The frames of a capture in a strip, each with how sharp it is. Read by a timer when a panel has asked."""
+"""Strip of a capture's frames with their sharpness, read by a timer once a panel wants it."""
 
 from dataclasses import dataclass
 
@@ -10,17 +10,18 @@ from ...core.capture.capture import Capture
 from ...core.capture.frame_records import read_frames
 from ...core.capture.messages import Problem
 from .. import captures, frame_icons, status
+from ..batch_watch import modified_ns
 
 INTERVAL_S = 0.5
 MOST_FRAMES = 12
-"""Frames in the strip"""
+"""Number of frames in the strip."""
 BLURRED_SHARE = 0.5
 """Sharpness below this share of the median counts as blurred."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """sharpness: in shares of the sharpest frame's; icon 0: the file is missing."""
+    """Frame with its sharpness relative to the sharpest one; icon 0: the file is missing."""
 
     name: str
     sharpness: float
@@ -30,8 +31,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Strip:
-    """Some frames of a capture, those that the texture uses first choice; how many there are, are used, and are blurred
-    in all."""
+    """Some frames of a capture, preferably those of the texture, and how many exist, are used and are blurred."""
 
     frames: tuple[Frame, ...]
     count: int
@@ -44,16 +44,16 @@ _wanted: set[str] = set()
 
 
 def of(item) -> Strip | None:
-    """The last known strip of a list item; None before the first look, or where there are no frames."""
+    """Return the last known strip of a list item; None before the first look, or without frames."""
     root = captures.root(item)
     _wanted.add(root)
     return _known[root][1] if root in _known else None
 
 
 def look(root: str) -> bool:
-    """Reads the capture's frames.json if it is another one than before. True if so."""
+    """Read the capture's frames.json if it has changed, and return whether."""
     capture = Capture(root)
-    time = capture.frames_json.stat().st_mtime_ns if capture.frames_json.is_file() else 0
+    time = modified_ns(capture.frames_json)
     if root in _known and _known[root][0] == time:
         return False
     _known[root] = time, _read(capture)
@@ -68,25 +68,21 @@ def _read(capture: Capture) -> Strip | None:
     if not frames:
         return None
     sharpness = [frame.sharpness for frame in frames]
-    used = [i for i, frame in enumerate(frames) if frame.selected]
+    selected_indices = [i for i, frame in enumerate(frames) if frame.selected]
     limit = BLURRED_SHARE * sorted(sharpness)[len(sharpness) // 2]
-    choice = used or list(range(len(frames)))
-    shown = [choice[i * len(choice) // min(MOST_FRAMES, len(choice))] for i in range(min(MOST_FRAMES, len(choice)))]
+    choice = selected_indices or list(range(len(frames)))
+    indices = [choice[i * len(choice) // min(MOST_FRAMES, len(choice))] for i in range(min(MOST_FRAMES, len(choice)))]
     sharpest = max(sharpness) or 1.0
-    return Strip(
-        tuple(
-            Frame(
-                frames[i].name.rpartition(".")[0],
-                sharpness[i] / sharpest,
-                sharpness[i] < limit,
-                frame_icons.load(capture.frames / frames[i].name),
-            )
-            for i in shown
-        ),
-        len(frames),
-        len(used),
-        sum(value < limit for value in sharpness),
+    strip = tuple(
+        Frame(
+            frames[i].name.rpartition(".")[0],
+            sharpness[i] / sharpest,
+            sharpness[i] < limit,
+            frame_icons.load(capture.frames / frames[i].name),
+        )
+        for i in indices
     )
+    return Strip(strip, len(frames), len(selected_indices), sum(value < limit for value in sharpness))
 
 
 def _tick() -> float:

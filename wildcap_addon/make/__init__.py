@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One click from a video to a relit head: the whole chain in one job, and what Blender does as its results come."""
+"""One click from a video to a relit head: the whole chain in one job, and its results in the scene."""
 
 import bpy
 

@@ -1,13 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The chain as words of the terminal: run and solve, by the solver that is set up in this Blender's preferences; its
-own words come through."""
+"""Subcommands run and solve, executed by the solver of this Blender's preferences."""
 
 import argparse
 import subprocess
 from pathlib import Path
 
-from ...core.capture.messages import Problem
 from .. import jobs, preferences
 from ..terminal import Command
 
@@ -22,15 +20,8 @@ def _solve(arguments) -> int:
 
 
 def _core(*words: str | Path) -> int:
-    """The solver's own command line, in the folder that Blender was called in, from which paths are told; returns its
-    exit code. Raises Problem where no solver is set up."""
-    python = preferences.python()
-    if python is None:
-        raise Problem(
-            "The solver is not set up on this machine.",
-            "Click Install Solver in the Setup panel of Blender's window, once.",
-        )
-    return subprocess.run([str(python), "-E", "-s", str(jobs.ROOT), *map(str, words)]).returncode
+    """Run the solver's command line, and return its exit code. Raises Problem if no solver is set up."""
+    return subprocess.run([str(preferences.require_python()), "-E", "-s", str(jobs.ROOT), *map(str, words)]).returncode
 
 
 def _of_run(kind) -> None:
@@ -41,7 +32,7 @@ def _of_run(kind) -> None:
 def _of_solve(kind) -> None:
     kind.add_argument("capture", help="the face's folder, usually NAME.wildcap")
     kind.add_argument(
-        "options", nargs=argparse.REMAINDER, help="as `python -m core run --help` tells them, --quality film among them"
+        "options", nargs=argparse.REMAINDER, help="see `python -m core run --help`; for example --quality film"
     )
 
 

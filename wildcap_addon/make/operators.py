@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: from the video to a relit head in one go, and from the proposed mask on."""
+"""Operators: from the video, or from the proposed mask, to a relit head."""
 
 import bpy
 
@@ -11,8 +11,10 @@ from . import results
 
 
 class WILDCAP_OT_make_my_head(JobOperator, bpy.types.Operator):
-    """Do all from the video or the photographs to a relit head: reconstruct, solve with the proposed shadow mask, put
-    the maps on the head, render it"""
+    """Make a relit head from the video or the photographs.
+
+    Reconstructs, solves with the proposed shadow mask, puts the maps on the head, and renders it.
+    """
 
     bl_idname = "wildcap.make_my_head"
     bl_label = "Make My Head"
@@ -21,15 +23,15 @@ class WILDCAP_OT_make_my_head(JobOperator, bpy.types.Operator):
         item = captures.require(context)
         capture = captures.folder(item)
         if not capture.source and not capture.texture.is_file():
-            raise Problem(
-                "This capture has no video: there is nothing to make a head of.", "Choose the video of your own face."
-            )
+            raise Problem("This capture has no video to make a head from.", "Choose the video of your own face.")
         results.begin(item)
 
 
 class WILDCAP_OT_accept_proposal(JobOperator, bpy.types.Operator):
-    """Solve with the shadow mask that was found automatically, or as it was painted, and go on to a relit head;
-    painting it and solving again stays possible"""
+    """Solve with the proposed shadow mask, or as it was painted, and go on to a relit head.
+
+    You can still paint it and solve again.
+    """
 
     bl_idname = "wildcap.accept_proposal"
     bl_label = "Accept Proposal"

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shadow mask, painted on the head or on a flat sheet of its texture."""
+"""Masks, painted on the head or on a flat sheet of its texture."""
 
 import bpy
 

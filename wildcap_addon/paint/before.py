@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an artist had before painting a mask: canvas, stencil, symmetry, shading, overlays, active object, selection and
-mode; and how it comes back.
+"""Artist's state before painting: canvas, stencil, symmetry, views, active object, selection and mode.
 
-Names and plain values only: an undo replaces every data-block, and a .blend that is saved while a mask is painted keeps
-them as JSON.
+It consists of names and plain values: an undo replaces every data-block, and a .blend saved during painting stores it
+as JSON.
 """
 
 import contextlib
@@ -15,11 +14,11 @@ from . import view
 
 _SETTINGS = ("mode", "canvas", "use_stencil_layer", "stencil_image", "stencil_color", "invert_stencil")
 MODES = {'PAINT_WEIGHT': 'WEIGHT_PAINT', 'PAINT_VERTEX': 'VERTEX_PAINT', 'PAINT_TEXTURE': 'TEXTURE_PAINT'}
-"""Of a context's mode, the name by which mode_set enters it, where it is another one."""
+"""Mode of a context -> its name for mode_set, if that differs."""
 
 
 def remember(context, head: bpy.types.Object) -> dict:
-    """To be called before anything is changed; `head` is what will be painted on."""
+    """Return the state before painting on `head`."""
     paint = context.scene.tool_settings.image_paint
     active = context.view_layer.objects.active
     return {
@@ -35,13 +34,13 @@ def remember(context, head: bpy.types.Object) -> dict:
 
 
 def at_rest(head: bpy.types.Object) -> None:
-    """The head is painted as it was solved, whatever face it makes: a stroke must not land on eyes or teeth."""
+    """Show the head without its expression, as it was solved: a stroke must not land on eyes or teeth."""
     if head.data.shape_keys is not None:
         head.active_shape_key_index, head.show_only_shape_key = 0, True
 
 
 def put_back(context, before: dict) -> None:
-    """All of it, from Object Mode; what was deleted meanwhile is left out."""
+    """Restore the state, from Object Mode; what was deleted meanwhile is skipped."""
     paint = context.scene.tool_settings.image_paint
     for name, value in before["paint"].items():
         setattr(paint, name, bpy.data.images.get(value or "") if name in ("canvas", "stencil_image") else value)
@@ -56,15 +55,11 @@ def put_back(context, before: dict) -> None:
     objects.active = objects.get(before["active"])
     mode = 'EDIT' if before["mode"].startswith("EDIT_") else MODES.get(before["mode"], before["mode"])
     if mode != 'OBJECT' and objects.active is not None:
-        with contextlib.suppress(TypeError, RuntimeError):  # the object of before cannot have that mode any more
+        with contextlib.suppress(TypeError, RuntimeError):  # the object no longer has that mode
             bpy.ops.object.mode_set(mode=mode)
 
 
 def _plain(value):
-    return (
-        value.name
-        if isinstance(value, bpy.types.Image)
-        else value
-        if isinstance(value, (str, bool, type(None)))
-        else tuple(value)
-    )
+    if isinstance(value, bpy.types.Image):
+        return value.name
+    return value if isinstance(value, (str, bool, type(None))) else tuple(value)

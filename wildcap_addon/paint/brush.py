@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mask brush, across Blender's versions: 4.2 assigns brushes, later ones activate them as assets.
+"""Mask brush: Blender 4.2 assigns brushes, later versions activate them as assets.
 
-A MASK brush paints the stencil image: its weight where it goes, the opposite with Ctrl held.
+A MASK brush paints its weight into the stencil image, the opposite with Ctrl held.
 """
 
 import contextlib
@@ -10,11 +10,11 @@ import contextlib
 import bpy
 
 NAME = "WildCap Mask"
-RADIUS_PX = 40  # of the brush at first
+RADIUS_PX = 40  # initial radius of the brush
 
 
 def activate(context) -> dict:
-    """Makes the mask brush the active one in Texture Paint mode; returns what `restore` needs."""
+    """Activate the mask brush in Texture Paint mode, and return what `restore` needs."""
     paint = context.scene.tool_settings.image_paint
     before = {
         "brush": paint.brush.name if paint.brush else "",
@@ -23,9 +23,12 @@ def activate(context) -> dict:
     }
     brush = bpy.data.brushes.get(NAME) or bpy.data.brushes.new(NAME, mode='TEXTURE_PAINT')
     setattr(brush, _type_property(brush), 'MASK')
-    brush.weight = 1.0
-    brush.strength = 1.0
-    _use(context, brush)
+    brush.weight = brush.strength = 1.0
+    if bpy.app.version >= (4, 3, 0):
+        brush.asset_mark()
+        bpy.ops.brush.asset_activate(asset_library_type='LOCAL', relative_asset_identifier=f"Brush/{brush.name}")
+    else:
+        paint.brush = brush
     unified = _unified(context.scene)
     before["unified"] = {
         name: getattr(unified, name)
@@ -39,15 +42,14 @@ def activate(context) -> dict:
 
 
 def restore(context, before: dict) -> None:
-    """The brush of before, in Texture Paint mode; ours is removed, and so is the one that Blender links from its
-    library for the mask tool."""
+    """Restore the brush; ours is removed, as is the one that Blender linked from its library for the mask tool."""
     unified = _unified(context.scene)
     for name, value in before["unified"].items():
         setattr(unified, name, value)
     paint = context.scene.tool_settings.image_paint
     reference = before["reference"]
-    painting = context.mode == 'PAINT_TEXTURE'  # or Blender crashes: the head is gone, or excluded from the view layer
-    with contextlib.suppress(RuntimeError):  # its library may be gone
+    painting = context.mode == 'PAINT_TEXTURE'  # otherwise Blender crashes: the head is gone or excluded
+    with contextlib.suppress(RuntimeError):  # its library may be missing
         if painting and reference is not None and reference["relative_asset_identifier"]:
             bpy.ops.brush.asset_activate(**reference)
     other = before["brush"] and (paint.brush is None or paint.brush.name != before["brush"])
@@ -65,15 +67,6 @@ def _came_with_tool(brush, before: dict) -> bool:
         and getattr(brush, _type_property(brush)) == 'MASK'
         and brush.name not in before.get("brushes", [brush.name])
     )
-
-
-def _use(context, brush) -> None:
-    paint = context.scene.tool_settings.image_paint
-    if bpy.app.version >= (4, 3, 0):
-        brush.asset_mark()
-        bpy.ops.brush.asset_activate(asset_library_type='LOCAL', relative_asset_identifier=f"Brush/{brush.name}")
-    else:
-        paint.brush = brush
 
 
 def _reference(paint) -> dict | None:

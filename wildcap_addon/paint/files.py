@@ -1,20 +1,21 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A painting session while .blend files are saved and opened: nothing that was painted is lost, and a file that was
-saved in the middle of it goes on. And after an undo, which is as a file opened anew: what it did not bring back follows
-it."""
+"""Painting session while .blend files are saved and opened, and after an undo.
+
+Nothing that was painted is lost, and a file that was saved during painting reopens in it.
+"""
 
 import bpy
 
 from . import session
 
 KEY = "wildcap_painting"
-"""Custom property of a scene, in the saved file only: the session in which it was saved."""
+"""Custom property of a scene, in saved files only: the painting session."""
 
 
 @bpy.app.handlers.persistent
 def before_save(*_):
-    """Painted pixels are in no .blend: whoever saves the file wants the mask saved too."""
+    """Save the mask as well, as a .blend does not store painted pixels."""
     session.save_or_show()
     if session.active():
         bpy.context.scene[KEY] = session.note()
@@ -48,7 +49,7 @@ def _take_notes() -> list[str]:
 
 @bpy.app.handlers.persistent
 def after_undo(*_):
-    """A moment later: in the handler itself Blender is still in the middle of it."""
+    """Call `settle` a moment later: during the handler the undo is not complete."""
     if not bpy.app.timers.is_registered(settle):
         bpy.app.timers.register(settle, first_interval=0.0)
 

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The artist's masks as Blender images, and back to the capture's shadow_mask.png and protect_mask.png.
+"""Masks of the artist as Blender images, and back to the capture's shadow_mask.png and protect_mask.png.
 
-The one place of the add-on that turns rows: Blender counts an image's rows from the bottom, files count from the top.
+The only place of the add-on that flips rows: Blender counts an image's rows from the bottom, files from the top.
 """
 
 import struct
@@ -20,22 +20,24 @@ from .. import colours
 
 
 def file_of(capture: Capture, mask_kind: str) -> Path:
-    """Where the mask SHADOW or PROTECT is kept."""
+    """Return the file of the mask 'SHADOW' or 'PROTECT'."""
     return capture.protect_mask if mask_kind == 'PROTECT' else capture.shadow_mask
 
 
 def load(capture: Capture, mask_kind: str = 'SHADOW') -> bpy.types.Image:
-    """The artist's mask as a Non-Color image of the texture's size that is ready to be painted on; where there is none
-    yet the proposal for the shadow, and nothing for what is to be protected."""
-    kept = file_of(capture, mask_kind)
-    path = kept if kept.is_file() else capture.shadow_mask_auto
+    """Return the artist's mask as a Non-Color image of the texture's size, ready for painting.
+
+    A new shadow mask starts from the proposal, a new protect mask empty.
+    """
+    own_file = file_of(capture, mask_kind)
+    path = own_file if own_file.is_file() else capture.shadow_mask_auto
     if not path.is_file():
         raise Problem("This capture has no shadow mask yet.", "Click Reconstruct first.")
     name = f"{capture.root.stem} {mask_kind.capitalize()} Mask"
     image = bpy.data.images.get(name)
     if image is not None:
         settle(image, capture, mask_kind)
-        path = kept if kept.is_file() else path
+        path = own_file if own_file.is_file() else path
         bpy.data.images.remove(image)
     image = bpy.data.images.load(str(path))
     image.name = name
@@ -46,32 +48,30 @@ def load(capture: Capture, mask_kind: str = 'SHADOW') -> bpy.types.Image:
             f"{path} is not a picture that can be read.",
             "Restore it from mask_history, or delete it to start from the proposal.",
         )
-    # The proposal is never overwritten: should Blender save the image itself, it goes where masks of artists go.
-    image.filepath_raw = str(kept)
-    if mask_kind == 'PROTECT' and not kept.is_file():
+    # The proposal is never overwritten: if Blender saves the image itself, it writes to the artist's mask.
+    image.filepath_raw = str(own_file)
+    if mask_kind == 'PROTECT' and not own_file.is_file():
         set_values(image, np.zeros_like(mask_values(image)))
     return image
 
 
 def settle(image: bpy.types.Image, capture: Capture, mask_kind: str) -> None:
-    """A mask that a .blend has packed against the capture's own: the newer one becomes the capture's, the other goes to
-    the history."""
+    """Compare a mask packed in the .blend with the capture's: the newer one is kept, the other goes to the history."""
     path = file_of(capture, mask_kind)
     if image.packed_file is None or not bpy.data.filepath or not image.size[0]:
         return
-    packed = grey_png(mask_values(image))
-    if path.is_file() and path.read_bytes() == packed:
+    packed_png = grey_png(mask_values(image))
+    if path.is_file() and path.read_bytes() == packed_png:
         return
     if not path.is_file() or Path(bpy.data.filepath).stat().st_mtime > path.stat().st_mtime:
         mask_history.keep(capture, path)
-        write(path, packed)
+        write(path, packed_png)
     else:
-        mask_history.keep(capture, path, packed)
+        mask_history.keep(capture, path, packed_png)
 
 
 def refresh(image: bpy.types.Image, capture: Capture, mask_kind: str) -> None:
-    """The image of a .blend that was opened again, as the newer of that file and the capture has it. Raises Problem
-    when there is no mask."""
+    """Load the newer mask of a reopened .blend and the capture into the image. Raises Problem if there is none."""
     path = file_of(capture, mask_kind)
     settle(image, capture, mask_kind)
     if image.packed_file is not None:
@@ -81,25 +81,22 @@ def refresh(image: bpy.types.Image, capture: Capture, mask_kind: str) -> None:
         image.reload()
     elif capture.shadow_mask_auto.is_file():
         image.source = 'FILE'
-        set_values(
-            image,
-            proposal(image, capture.shadow_mask_auto) if mask_kind == 'SHADOW' else np.zeros_like(mask_values(image)),
-        )
+        is_shadow = mask_kind == 'SHADOW'
+        set_values(image, proposal(image, capture.shadow_mask_auto) if is_shadow else np.zeros_like(mask_values(image)))
     colours.as_data(image)
     if not image.size[0]:
         raise Problem(
-            "The mask that was being painted is gone.", "Click Paint on the Head, under Masks: it is looked for again."
+            "The mask that was being painted is missing.", "Click Paint on the Head, under Masks, to load it again."
         )
 
 
 def mask_values(image: bpy.types.Image) -> np.ndarray:
-    """The mask float32 [H, W] in [0, 1], rows from the top."""
+    """Return the mask float32 [H, W] in [0, 1], rows from the top."""
     return from_top(pixels(image))
 
 
 def pixels(image: bpy.types.Image, into: np.ndarray | None = None) -> np.ndarray:
-    """All that Blender keeps of a mask, float32 [H, W, channels], rows from the bottom; in the array `into` where that
-    has the shape."""
+    """Return an image's pixels, float32 [H, W, C], rows from the bottom; in `into` if that has the shape."""
     shape = image.size[1], image.size[0], image.channels
     buffer = into if into is not None and into.shape == shape else np.empty(shape, np.float32)
     image.pixels.foreach_get(buffer.ravel())
@@ -107,12 +104,12 @@ def pixels(image: bpy.types.Image, into: np.ndarray | None = None) -> np.ndarray
 
 
 def from_top(pixels: np.ndarray) -> np.ndarray:
-    """The mask [H, W], rows from the top, of an image's pixels. Knows no bpy: a thread may do it."""
+    """Return the mask [H, W], rows from the top, of an image's pixels. Safe in a thread."""
     return np.flipud(pixels[..., 0])
 
 
 def set_values(image: bpy.types.Image, mask: np.ndarray) -> None:
-    """Puts a mask [H, W] in [0, 1], rows from the top, into the image."""
+    """Put a mask [H, W] in [0, 1], rows from the top, into the image."""
     width, height = image.size
     pixels = np.ones((height, width, image.channels), np.float32)
     pixels[..., : min(3, image.channels)] = np.flipud(mask)[..., None]
@@ -121,7 +118,7 @@ def set_values(image: bpy.types.Image, mask: np.ndarray) -> None:
 
 
 def proposal(image: bpy.types.Image, path: Path) -> np.ndarray:
-    """The mask of a file [H, W], at the image's size. Raises Problem where there is none."""
+    """Return the mask of a file [H, W] at the image's size. Raises Problem if there is none."""
     if not path.is_file():
         raise Problem(
             "This capture has no proposal for its shadow mask.", "Click Reconstruct, or paint the mask by hand."
@@ -136,34 +133,11 @@ def proposal(image: bpy.types.Image, path: Path) -> np.ndarray:
         bpy.data.images.remove(other)
 
 
-def save_image(image: bpy.types.Image, capture: Capture, mask_kind: str = 'SHADOW', keep: bool = True) -> bool:
-    """As `store_mask`, of an image.
+def store_mask(mask: np.ndarray, capture: Capture, mask_kind: str, keep: bool = True) -> bool:
+    """Write a mask [H, W] in [0, 1], rows from the top, as 8 bit grey, atomically. Safe in a thread.
 
-    Parameters
-    ----------
-    image : shows the mask
-    capture, mask_kind, keep : as `store_mask` has them
-
-    Returns
-    -------
-    False where nothing was written.
-    """
-    return store_mask(mask_values(image), capture, mask_kind, keep)
-
-
-def store_mask(mask: np.ndarray, capture: Capture, mask_kind: str, keep: bool) -> bool:
-    """Writes a mask to its file (8 bit grey), atomically. Knows no bpy: a thread may do it.
-
-    Parameters
-    ----------
-    mask : [H, W] in [0, 1], rows from the top
-    capture : whose it is
-    mask_kind : 'SHADOW' or 'PROTECT'
-    keep : whether the mask that was there goes to mask_history
-
-    Returns
-    -------
-    False, and nothing is written, where the file holds that mask already, or there is nothing to protect and never was.
+    With `keep` the previous mask goes to mask_history. False means that nothing was written: the file is the same, or
+    nothing is protected and never was.
     """
     path = file_of(capture, mask_kind)
     content = grey_png(mask)
@@ -181,7 +155,7 @@ def write(path: Path, content: bytes) -> None:
 
 
 def grey_png(mask: np.ndarray) -> bytes:
-    """A PNG file, 8 bit grey, of a mask [H, W] in [0, 1], rows from the top (PNG specification, ISO/IEC 15948)."""
+    """Return an 8 bit grey PNG of a mask [H, W] in [0, 1], rows from the top (ISO/IEC 15948)."""
     height, width = mask.shape
     rows = np.zeros((height, width + 1), np.uint8)  # a row starts with its filter type, 0
     rows[:, 1:] = np.clip(np.round(mask * 255), 0, 255)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: paint a mask on the head or on the flat sheet, change it as a whole, and leave with it saved."""
+"""Operators: paint a mask on the head or on the flat sheet, edit it as a whole, save it and leave."""
 
 import bpy
 
@@ -22,8 +22,7 @@ EDITS = {
 
 
 class WILDCAP_OT_paint_mask(CaptureOperator, bpy.types.Operator):
-    """Paint where the shadow is (red), or what must be kept as skin (green): Ctrl takes away; on the head or on a flat
-    sheet of its texture"""
+    """Paint shadows (red), or what must be kept as skin (green), on the head or on a flat sheet; Ctrl removes paint."""
 
     bl_idname = "wildcap.paint_mask"
     bl_label = "Paint Mask"
@@ -41,11 +40,7 @@ class WILDCAP_OT_paint_mask(CaptureOperator, bpy.types.Operator):
         options={'SKIP_SAVE'},
         items=[
             ('SHADOW', "Shadow", "Where a shadow is baked into the texture"),
-            (
-                'PROTECT',
-                "Protect",
-                "Moles, scars and make-up that the solver must not take for shadow; it wins over the shadow mask",
-            ),
+            ('PROTECT', "Protect", "Moles, scars and make-up that are not shadow; overrides the shadow mask"),
         ],
     )
 
@@ -54,7 +49,7 @@ class WILDCAP_OT_paint_mask(CaptureOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_finish_mask(BaseOperator, bpy.types.Operator):
-    """Save the mask to the capture and go back to Object Mode; everything else is as it was"""
+    """Save the mask to the capture and return to Object Mode."""
 
     bl_idname = "wildcap.finish_mask"
     bl_label = "Save Mask and Leave"
@@ -69,11 +64,11 @@ class WILDCAP_OT_finish_mask(BaseOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
-    """Change the whole mask at once; Ctrl-Z takes it back as it does a stroke"""
+    """Change the whole mask at once; Ctrl-Z undoes it like a stroke."""
 
     bl_idname = "wildcap.edit_mask"
     bl_label = "Edit Mask"
-    bl_options = {'REGISTER'}  # a step of the image's own undo is pushed below: the global one knows nothing of pixels
+    bl_options = {'REGISTER'}  # `work` pushes a step of the image's own undo: the global one ignores pixels
 
     kind: bpy.props.EnumProperty(
         name="Change",
@@ -82,17 +77,17 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
             ('GROW', "Grow", "Wider by a few texels"),
             ('SHRINK', "Shrink", "Narrower by a few texels"),
             ('SOFTEN', "Soften", "Fade the borders"),
-            ('MIRROR', "Mirror", "What is masked on one side is masked on the other, too"),
+            ('MIRROR', "Mirror", "Mask on each side what is masked on the other"),
             ('INVERT', "Invert", "Shadow where there was none"),
             ('CLEAR', "Clear", "No shadow anywhere"),
-            ('PROPOSAL', "Back to Proposal", "Start again from the mask that was found automatically"),
-            ('SNAPPED', "Take Snapped Mask", "The mask that was painted, laid on the shadow's edges"),
+            ('PROPOSAL', "Back to Proposal", "Start again from the proposed mask"),
+            ('SNAPPED', "Take Snapped Mask", "Your mask, aligned with the shadow's edges"),
         ],
     )
 
     @classmethod
     def description(cls, context, properties):
-        return cls.bl_rna.properties["kind"].enum_items[properties.kind].description + "; Ctrl-Z takes it back"
+        return cls.bl_rna.properties["kind"].enum_items[properties.kind].description + "; Ctrl-Z undoes it"
 
     @classmethod
     def poll(cls, context):
@@ -109,31 +104,32 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
         image = session.mask()
         mask = mask_image.mask_values(image)
         files = {"PROPOSAL": capture.shadow_mask_auto, "SNAPPED": capture.shadow_mask_edges}
-        changed = mask_image.proposal(image, files[self.kind]) if self.kind in files else EDITS[self.kind](mask)
-        # what Ctrl-Z comes back to: Blender 5 keeps what was before a step, not what was after it
+        new_mask = mask_image.proposal(image, files[self.kind]) if self.kind in files else EDITS[self.kind](mask)
+        # the state that Ctrl-Z restores: Blender 5 stores the one before a step, not the one after it
         if not image.is_dirty or bpy.app.version >= (5, 0, 0):
             session.push_undo(context)
-        mask_image.set_values(image, changed)
+        mask_image.set_values(image, new_mask)
         session.push_undo(context)
         if self.kind == session.offered():
             session.offer("")
 
 
 class ToolOperator(BaseOperator):
-    """Mixin: an operator that has a worker look at the texture while the painting goes on. Its result waits for a
-    click: no stroke is ever overwritten."""
+    """Operator that starts a worker during painting; its result waits for a click, so that no stroke is overwritten."""
 
     @classmethod
     def poll(cls, context):
         return cls.allowed(
             session.painted_kind() == 'SHADOW',
-            "Click Paint on the Head, under Masks, and choose Shadow: only the shadow mask is found by itself",
+            "Click Paint on the Head, under Masks, and choose Shadow: only shadows can be detected",
         ) and jobs.can_start(cls, context)
 
 
 class WILDCAP_OT_detect_mask(ToolOperator, bpy.types.Operator):
-    """Look for the shadows in the texture again, with the sensitivity set under Reconstruction; the result waits for a
-    click, what you painted stays"""
+    """Detect the shadows in the texture again, with the sensitivity under Reconstruction.
+
+    The result waits for a click; your painting stays.
+    """
 
     bl_idname = "wildcap.detect_mask"
     bl_label = "Detect"
@@ -141,18 +137,20 @@ class WILDCAP_OT_detect_mask(ToolOperator, bpy.types.Operator):
     def work(self, context):
         item = captures.require(context)
         stage = stages.by_name(stages.MASK_STAGE)
-        lacking = [name for name in stage.reads if not captures.folder(item).has(name)]
-        if lacking:
+        missing = [name for name in stage.reads if not captures.folder(item).has(name)]
+        if missing:
             raise Problem(
-                f"Shadows are looked for in {lacking[0]}, which this capture does not have.",
-                "Paint by hand: the sample head comes without it. Your own video brings it, once it is reconstructed.",
+                f"Shadows are detected in {missing[0]}, which this capture does not have.",
+                "Paint by hand: the sample head comes without it. Your own video has it after Reconstruct.",
             )
         jobs.start(item, "tool", first=stage.name, last=stage.name, then=lambda: session.offer('PROPOSAL'))
 
 
 class WILDCAP_OT_snap_mask(ToolOperator, bpy.types.Operator):
-    """Lay the border of what you painted on the shadow's own edge, hard or soft as it is in the texture; the result
-    waits for a click"""
+    """Align the border of your mask with the shadow's edge in the texture, hard or soft.
+
+    The result waits for a click.
+    """
 
     bl_idname = "wildcap.snap_mask"
     bl_label = "Snap to Edges"

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel: where to paint the mask, and the brush while it is painted."""
+"""Panels: where to paint a mask, and the brush and edits during painting."""
 
 import bpy
 
@@ -22,17 +22,15 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         column = layout.column(align=True)
-        here = 'SHEET' if session.on_sheet() else 'HEAD'
+        now = {"mask": session.painted_kind(), "on": 'SHEET' if session.on_sheet() else 'HEAD'}
         for name, choices in (
             ("mask", (("Shadow", 'SHADOW'), ("Protect", 'PROTECT'))),
             ("on", (("On the Head", 'HEAD'), ("On the Flat Sheet", 'SHEET'))),
         ):
             row = column.row(align=True)
             for text, value in choices:
-                options = {"mask": session.painted_kind(), "on": here, name: value}
-                button = row.operator(
-                    "wildcap.paint_mask", text=text, depress=options == {"mask": session.painted_kind(), "on": here}
-                )
+                options = {**now, name: value}
+                button = row.operator("wildcap.paint_mask", text=text, depress=options == now)
                 button.mask, button.on = options["mask"], options["on"]
         brush = context.scene.tool_settings.image_paint.brush
         if brush is not None:
@@ -42,7 +40,7 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
         row.prop(context.scene.tool_settings.image_paint, "stencil_color", text="")
         if context.space_data is not None:
             row.prop(context.space_data.overlay, "texture_paint_mode_opacity", text="Tint", slider=True)
-        if context.object is not None and context.object.type == 'MESH':  # whose own symmetry is what a stroke follows
+        if context.object is not None and context.object.type == 'MESH':  # a stroke follows its mesh's symmetry
             layout.prop(context.object.data, "use_mirror_x", text="Mirror Left and Right")
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
         for kind in EDITS:

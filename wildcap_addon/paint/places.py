@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the mask of a session is painted: on the head, or on the flat sheet; into Texture Paint on either, and back.
-Which of them it is, the scene says, for an undo may take the sheet away or bring it back."""
+"""Two places to paint a mask, the head and the flat sheet, and the changes between them.
+
+The scene decides which one is in use, as an undo may remove the sheet or bring it back.
+"""
 
 import bpy
 
@@ -11,31 +13,31 @@ from . import sheet, view
 
 
 def follow_name(session) -> None:
-    """A head that was renamed since is known by its capture; the session then goes on by its new name."""
+    """Update the session if the head was renamed; its capture identifies it."""
     scene = bpy.data.scenes.get(session.scene)
     heads = [item.head for item in scene.wildcap.captures if captures.root(item) == session.root] if scene else []
     old, new = session.head, heads[0].name if heads and heads[0] is not None else session.head
     if new != old:
-        told = session.before
-        told["selected"] = [new if name == old else name for name in told["selected"]]
-        told.update({key: new for key in ("active", "head") if told.get(key) == old})
+        before = session.before
+        before["selected"] = [new if name == old else name for name in before["selected"]]
+        before.update({key: new for key in ("active", "head") if before.get(key) == old})
         session.head = new
 
 
 def turn(context, session, use_sheet: bool) -> None:
-    """From the head to the sheet or back."""
+    """Change from the head to the sheet or back."""
     if use_sheet != sheet.is_there():
         leave(context, session)
         enter(context, session, use_sheet)
 
 
 def enter(context, session, use_sheet: bool) -> None:
-    """Texture Paint on one of the two. Raises Problem when the head is gone."""
+    """Enter Texture Paint on one of the two. Raises Problem if the head is missing."""
     if context.mode != 'OBJECT':
         bpy.ops.object.mode_set(mode='OBJECT')
     target = bpy.data.objects.get(session.head)
     if target is None or target.name not in context.scene.objects:
-        raise Problem("The head is not in this scene any more.", "Undo, or bring the head in again.")
+        raise Problem("The head is no longer in this scene.", "Undo, or bring the head in again.")
     captures.require_shown(context, target)
     if use_sheet:
         target = sheet.make(context, context.scene.tool_settings.image_paint.canvas, target)
@@ -46,7 +48,7 @@ def enter(context, session, use_sheet: bool) -> None:
 
 
 def leave(context, session) -> None:
-    """Back to Object Mode on the head, the sheet gone."""
+    """Return to Object Mode on the head, without the sheet."""
     if context.mode != 'OBJECT':
         bpy.ops.object.mode_set(mode='OBJECT')
     if sheet.is_there():
@@ -59,7 +61,7 @@ def leave(context, session) -> None:
 
 
 def face(session, the_sheet: bool) -> None:
-    """Turns the views to the sheet, or back from it."""
+    """Turn the views to the sheet, or back from it."""
     if the_sheet and not session.faces_sheet:
         view.face_sheet(session.before["views"], (0, 0, 0), sheet.SIDE_M)
     elif session.faces_sheet and not the_sheet:

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A painting session: from Paint Mask to the saved mask, with everything put back as it was.
+"""Painting session: from Paint Mask to the saved mask, with the artist's state restored.
 
-Its state is names and values, never references: an undo replaces every data-block. However the artist leaves
-(the button, Tab, opening or saving a file), the mask reaches the capture's folder, and within seconds of a stroke's end
-anyway: Blender may be killed. A .blend that is saved in the middle of it is opened in the middle of it.
+The session consists of names and values, as an undo replaces every data-block. However the artist leaves (the button,
+Tab, opening or saving a file), the mask is saved in the capture, and within seconds of each stroke, in case Blender is
+killed. A .blend saved during painting reopens in it.
 """
 
 import json
@@ -13,39 +13,46 @@ from dataclasses import asdict, dataclass, field
 
 import bpy
 
-from ...core.capture import unforeseen
 from ...core.capture.capture import Capture
 from ...core.capture.messages import Problem
 from .. import captures, head, problems
 from . import before, brush, keeping, mask_image, places, sheet, view
 
 TINTS = {"SHADOW": "shadow_tint", "PROTECT": "protect_tint"}
-"""The scene's properties that keep the colour in which a mask is shown."""
+"""Scene properties with the colour of each mask."""
 WATCH_S = 0.5
 KEEP_UP_S = 3.0
-"""Between two looks at whether the mask changed; a look costs the reading of its pixels."""
+"""Interval of the checks for changes of the mask, each of which reads its pixels."""
 
 
 @dataclass
 class Session:
-    """What is being painted, and what was there before."""
+    """Painted mask, and the artist's state before."""
 
     root: str
     scene: str
     head: str
     mask: str
     which: str = 'SHADOW'  # or 'PROTECT'
-    faces_sheet: bool = False  # the views look at the sheet
+    faces_sheet: bool = False  # the views show the sheet
     before: dict = field(default_factory=dict)
     brush: dict = field(default_factory=dict)
-    looked: float = 0.0  # when the mask was last looked at (time.monotonic)
-    offered: str = ""  # the kind of edit that a worker has prepared
-    # size and time of the mask's file as this session wrote it; another one goes to the history first
+    looked: float = 0.0  # time of the last check for changes (time.monotonic)
+    offered: str = ""  # kind of edit that a worker has prepared
+    # size and time of the mask's file as this session wrote it; any other file goes to the history first
     written: tuple = ()
+
+    @property
+    def capture(self) -> Capture:
+        return Capture(self.root)
+
+    @property
+    def image(self) -> bpy.types.Image | None:
+        return bpy.data.images.get(self.mask)
 
 
 _session: Session | None = None
-_ended: Session | None = None  # the last one, for an undo may bring its scene back
+_ended: Session | None = None  # the last one, as an undo may restore its scene
 _saving: keeping.Saving | None = None
 
 
@@ -58,55 +65,51 @@ def on_sheet() -> bool:
 
 
 def painted_kind() -> str:
-    """The mask that is painted: SHADOW or PROTECT; '' for none."""
+    """Return the painted mask, SHADOW or PROTECT; '' for none."""
     return _session.which if _session else ""
 
 
 def root() -> str:
-    """The folder of the capture whose mask is painted."""
+    """Return the folder of the capture whose mask is painted."""
     return _session.root
 
 
 def mask() -> bpy.types.Image:
-    """The image that is painted. Raises Problem when it is gone."""
-    image = bpy.data.images.get(_session.mask) if _session else None
+    """Return the painted image. Raises Problem if it is missing."""
+    image = _session.image if _session else None
     if image is None:
         raise Problem(
-            "The mask is not in this file any more.",
+            "The mask is no longer in this file.",
             "Leave the painting, and click Paint on the Head, under Masks, again.",
         )
     return image
 
 
 def offered() -> str:
-    """What a worker has prepared for a click: PROPOSAL, SNAPPED, or '' for nothing."""
+    """Return the kind of edit that a worker has prepared: PROPOSAL, SNAPPED, or '' for none."""
     return _session.offered if _session else ""
 
 
 def offer(kind: str) -> None:
-    """Notes what waits for a click; nobody may be painting any more."""
+    """Offer a prepared edit, if the artist is still painting."""
     if _session is not None:
         _session.offered = kind
 
 
 def push_undo(context) -> None:
-    """A step of the mask's own undo. Pixels written by a script are in no undo step; an operator of Blender's that
-    changes nothing, run after them, makes them one among the strokes."""
-    if not bpy.app.background:  # without a window the operator crashes, and there is nobody to press Ctrl-Z
+    """Push a step of the mask's own undo.
+
+    Undo ignores pixels that a script writes; an operator that changes nothing, run after them, records them.
+    """
+    if not bpy.app.background:  # without a window the operator crashes
         with context.temp_override(edit_image=mask()):
             bpy.ops.image.invert(invert_r=False, invert_g=False, invert_b=False, invert_a=False)
 
 
 def begin_painting(context, item, use_sheet: bool, mask_kind: str = 'SHADOW') -> None:
-    """Enters Texture Paint, the mask as the tinted stencil and the mask brush in hand. Raises Problem without head or
-    texture.
+    """Enter Texture Paint on the head or the sheet, with the mask as tinted stencil and the mask brush.
 
-    Parameters
-    ----------
-    context : Blender's
-    item : the capture's
-    use_sheet : paint on the flat sheet, not on the head
-    mask_kind : 'SHADOW' or 'PROTECT'
+    Raises Problem without head or texture.
     """
     global _session
     if _session is not None and _session.which == mask_kind:
@@ -116,9 +119,9 @@ def begin_painting(context, item, use_sheet: bool, mask_kind: str = 'SHADOW') ->
     end_painting(context)
     capture = captures.folder(item)
     obj = captures.require_head(context, item)
-    texture = head.load_image(capture.texture_png) if capture.texture_png.is_file() else None
-    if texture is None:
+    if not capture.texture_png.is_file():
         raise Problem("This capture has no texture to paint over.", "Click Reconstruct first.")
+    texture = head.load_image(capture.texture_png)
     image = mask_image.load(capture, mask_kind)
     _session = Session(
         str(capture.root), context.scene.name, obj.name, image.name, mask_kind, before=before.remember(context, obj)
@@ -144,23 +147,25 @@ def begin_painting(context, item, use_sheet: bool, mask_kind: str = 'SHADOW') ->
 
 
 def end_painting(context) -> None:
-    """Saves the mask and puts everything back. Safe to call when the artist has left the mode by other ways."""
+    """Save the mask and restore the artist's state, also if the artist has left Texture Paint by other means."""
     global _ended
     session = _session
     if session is None:
         return
     save()  # a Problem here leaves the session open, and nothing is lost
     places.follow_name(session)
-    # only in this mode does Blender let go of a brush
+    # Blender releases a brush only in this mode
     if context.mode != 'PAINT_TEXTURE' and session.head in context.view_layer.objects:
         places.enter(context, session, sheet.is_there())
     brush.restore(context, session.brush)
-    _keep_tint(context)
+    props = context.scene.wildcap  # keeps the tint for the next session
+    setattr(props, TINTS[session.which], context.scene.tool_settings.image_paint.stencil_color)
+    props.tint_strength = view.opacity(session.before["views"]) or props.tint_strength
     places.leave(context, session)
     before.put_back(context, session.before)
-    image = bpy.data.images.get(session.mask)
-    if image is not None and mask_image.file_of(Capture(session.root), session.which).is_file():
-        image.reload()  # from the file, so that Blender does not ask to save it
+    image = session.image
+    if image is not None and mask_image.file_of(session.capture, session.which).is_file():
+        image.reload()  # so that Blender does not ask to save it
     elif image is not None:
         bpy.data.images.remove(image)
     forget()
@@ -168,46 +173,32 @@ def end_painting(context) -> None:
 
 
 def after_undo(context) -> None:
-    """Undo and redo bring objects and modes back, but not what the views look at, and nothing of a painting that has
-    ended: the mask stays as it was left."""
-    active = context.view_layer.objects.active
+    """Correct what an undo or redo leaves out: the views, and the end of a painting, whose mask stays as it was."""
     if _ended is not None:
         places.follow_name(_ended)
-    # undone past its start: the watch ends it, and what was saved before goes to the history
     if _session is not None and context.mode == 'OBJECT':
-        _session.written = ()
+        _session.written = ()  # undone past its start: the watch ends it, and the mask file goes to the history
     elif _session is not None:
         places.face(_session, sheet.is_there())
-    elif (
-        _ended is not None
-        and context.mode == 'PAINT_TEXTURE'
-        and active is not None
-        and active.name in (_ended.head, sheet.NAME)
-    ):
-        places.leave(context, _ended)
-        before.put_back(context, _ended.before)
-
-
-def _keep_tint(context) -> None:
-    """The tint as the artist left it, for the next session."""
-    props = context.scene.wildcap
-    setattr(props, TINTS[_session.which], context.scene.tool_settings.image_paint.stencil_color)
-    props.tint_strength = view.opacity(_session.before["views"]) or props.tint_strength
+    elif _ended is not None and context.mode == 'PAINT_TEXTURE':
+        active = context.view_layer.objects.active
+        if active is not None and active.name in (_ended.head, sheet.NAME):
+            places.leave(context, _ended)
+            before.put_back(context, _ended.before)
 
 
 def save() -> None:
-    """Writes the mask to the capture, atomically, if it changed. Raises Problem when it cannot."""
+    """Write the mask to the capture if it has changed. Raises Problem if it cannot."""
     wait()
-    image = bpy.data.images.get(_session.mask) if _session else None
+    image = _session.image if _session else None
     if image is not None:
         _session.written = keeping.store_painting(
-            mask_image.mask_values(image), Capture(_session.root), _session.which, _session.written
+            mask_image.mask_values(image), _session.capture, _session.which, _session.written
         )
 
 
 def keep_up(stroking: bool) -> None:
-    """Saves a mask that was painted on, every few seconds, but not in the middle of a stroke; the main thread reads the
-    pixels and no more."""
+    """Save a changed mask every few seconds, but not during a stroke; the main thread only copies the pixels."""
     global _saving
     if _saving is not None and _saving.is_alive():
         return
@@ -215,14 +206,14 @@ def keep_up(stroking: bool) -> None:
         wait()
     except Problem as problem:
         problems.show(_session.root, problem)
-    image = bpy.data.images.get(_session.mask)
+    image = _session.image
     if not stroking and image is not None and image.is_dirty and time.monotonic() - _session.looked >= KEEP_UP_S:
         _session.looked = time.monotonic()
-        _saving = keeping.Saving(image, Capture(_session.root), _session.which, _session.written)
+        _saving = keeping.Saving(image, _session.capture, _session.which, _session.written)
 
 
 def wait() -> None:
-    """Waits for a mask that is being saved aside. Raises Problem when it could not be."""
+    """Wait for a mask that is being saved in a thread. Raises Problem if it could not be."""
     global _saving
     saving, _saving = _saving, None
     if saving is not None:
@@ -232,7 +223,7 @@ def wait() -> None:
 
 
 def forget() -> None:
-    """Drops the session without touching Blender's data, for a file that is being replaced."""
+    """Drop the session without changing Blender's data, for a file that is being replaced."""
     global _session, _ended
     _session = _ended = None
     keeping.forget()
@@ -244,7 +235,7 @@ def _start_watching() -> None:
 
 
 def _watch() -> float | None:
-    """Ends the session when the artist has left Texture Paint by another way."""
+    """Save changes, and end the session once the artist has left Texture Paint by other means."""
     if _session is None:
         return None
     window = next((w for w in bpy.context.window_manager.windows if w.scene.name == _session.scene), None)
@@ -255,8 +246,8 @@ def _watch() -> float | None:
             root = _session.root
             try:
                 end_painting(bpy.context)
-            except Exception as error:  # nobody is above a timer: without this, Blender would drop it
-                problems.show(root, error if isinstance(error, Problem) else unforeseen.explain(error, "painting"))
+            except Exception as error:  # Blender would drop the timer
+                problems.show_error(root, error, "painting")
                 return WATCH_S * 4
         else:
             keep_up(any(operator.bl_idname == 'PAINT_OT_image_paint' for operator in window.modal_operators))
@@ -264,16 +255,16 @@ def _watch() -> float | None:
 
 
 def note() -> str:
-    """The session as JSON, for the file in which it is saved; '' for none."""
+    """Return the session as JSON, for the file that is being saved; '' for none."""
     return json.dumps(asdict(_session)) if _session else ""
 
 
 def go_on(text: str) -> None:
-    """Takes up the session of a note, with the mask that is the newer one of file and capture."""
+    """Continue the session of a note, with the newer mask of file and capture."""
     global _session
     try:
         _session = Session(**json.loads(text))
-        mask_image.refresh(mask(), Capture(_session.root), _session.which)
+        mask_image.refresh(mask(), _session.capture, _session.which)
     except (ValueError, TypeError):  # a note of another version
         forget()
         return
@@ -286,7 +277,7 @@ def go_on(text: str) -> None:
 
 
 def save_or_show() -> None:
-    """As `save`, where nobody can catch a Problem: it is shown in the tab."""
+    """Save the mask; a Problem is shown in the tab."""
     try:
         save()
     except Problem as problem:
@@ -294,7 +285,7 @@ def save_or_show() -> None:
 
 
 def stop() -> None:
-    """Saves the mask and stops watching, for an add-on that leaves."""
+    """Save the mask and stop watching."""
     save_or_show()
     forget()
     if bpy.app.timers.is_registered(_watch):

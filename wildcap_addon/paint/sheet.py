@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flat sheet: one square with the whole texture on it, looked at from straight above, to paint the mask in UV
-space.
+"""Flat sheet: a square with the whole texture, seen from above, to paint the mask in UV space.
 
-What it hides it keeps in a property of its own, which an undo brings back together with it.
+It stores what it hides in a property of its own, which an undo restores together with it.
 """
 
 import json
@@ -18,13 +17,12 @@ HIDDEN_KEY = "wildcap_hidden"
 
 
 def is_there() -> bool:
-    """Whether there is a sheet: by an undo it may come and go."""
+    """Return whether there is a sheet: an undo may change it."""
     return NAME in bpy.data.objects
 
 
 def make(context, image: bpy.types.Image, head: bpy.types.Object) -> bpy.types.Object:
-    """The sheet in the scene: SIDE_M wide, UV (0, 0) at its lower left, the texture in a material, painted with the
-    head's symmetry. Everything else is hidden."""
+    """Make the sheet, SIDE_M wide, UV (0, 0) at its lower left, with the head's symmetry, and hide everything else."""
     remove()
     mesh = bpy.data.meshes.new(NAME)
     half = SIDE_M / 2
@@ -39,9 +37,9 @@ def make(context, image: bpy.types.Image, head: bpy.types.Object) -> bpy.types.O
     nodes.active = node
     mesh.materials.append(material)
     sheet = bpy.data.objects.new(NAME, mesh)
-    sheet[captures.HEAD_KEY] = head[captures.HEAD_KEY]  # the panel means this capture, whichever is chosen in the list
+    sheet[captures.HEAD_KEY] = head[captures.HEAD_KEY]  # the panel shows this capture
     context.scene.collection.objects.link(sheet)
-    context.view_layer.update()  # or whoever looks through its objects next finds one that is gone, and Blender ends
+    context.view_layer.update()  # or a removed object stays in it, and Blender crashes
     others = [thing for thing in context.view_layer.objects if thing != sheet and not thing.hide_get()]
     sheet[HIDDEN_KEY] = json.dumps([thing.name for thing in others])
     for thing in others:
@@ -50,8 +48,7 @@ def make(context, image: bpy.types.Image, head: bpy.types.Object) -> bpy.types.O
 
 
 def remove(head: bpy.types.Object | None = None) -> None:
-    """Takes the sheet and all it is made of away, and shows what it hid; the symmetry that was set on it goes over to
-    the head."""
+    """Remove the sheet and its data, and show what it hid; the head gets the symmetry that was set on it."""
     if head is not None and NAME in bpy.data.meshes:
         head.data.use_mirror_x = bpy.data.meshes[NAME].use_mirror_x
     hidden = json.loads(bpy.data.objects[NAME].get(HIDDEN_KEY, "[]")) if is_there() else []

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the video to the textured head: starts the worker, brings its result in."""
+"""From the video to the textured head."""
 
 import bpy
 

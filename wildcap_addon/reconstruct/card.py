@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The choice of the delighter as it is drawn: all of them with those greyed that lack something, the card of the chosen
-one, its own settings and needs."""
+"""Choice of the delighter: all of them, and the card, settings and needs of the chosen one."""
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -21,18 +20,18 @@ LOOKS = {
     "licence": 'TEXT',
 }
 FOLDED = ("runs", "shadows", "weights", "licence")
-"""Facts of a card that are shown when it is unfolded."""
+"""Facts of a card that only the unfolded card shows."""
 
 
 def draw(layout, item, width: int) -> None:
-    """Everything of the Delighter panel but the wipe."""
-    chosen = item.delight.delighter
+    """Draw the Delighter panel up to the wipe; delighters that lack something are greyed."""
+    delighter = item.delight.delighter
     grid = layout.grid_flow(columns=COLUMNS, row_major=True, even_columns=True, align=True)
     for name in delighter_cards.choices():
         cell = grid.row(align=True)
-        cell.active = name == chosen or not lacks(item, name)
+        cell.active = name == delighter or not lacks(item, name)
         cell.prop_enum(item.delight, "delighter", name)
-    card = delighter_cards.CARDS[chosen]
+    card = delighter_cards.CARDS[delighter]
     box = layout.box()
     problems.draw_text(box, card.what, width)
     _draw_facts(box, card, width, folded=False)
@@ -43,17 +42,17 @@ def draw(layout, item, width: int) -> None:
     column = layout.column()
     for name in card.settings:
         column.prop(item.delight, name)
-    if chosen == "switchlight":
+    if delighter == "switchlight":
         preferences.draw_key(column, "Key")
         _draw_sending(column, item, width)
-    for why in lacks(item, chosen):
-        problems.draw_text(layout.column(), iface_(why).format(service.WEBSITE), width, 'ERROR')
+    for reason in lacks(item, delighter):
+        problems.draw_text(layout.column(), iface_(reason).format(service.WEBSITE), width, 'ERROR')
 
 
 def lacks(item, name: str) -> list[str]:
-    """Why a delighter cannot run as things are, one sentence each, {} for the service's website; asks no disk."""
+    """Return why a delighter cannot run, a sentence each, {} for the service's website; does not touch the disk."""
     reasons = list(delighter_cards.missing(item.delight, name))
-    if name == "switchlight" and not preferences.has_switchlight_key():
+    if name == "switchlight" and not preferences.switchlight_key():
         reasons.append("There is no key. Get one at {}, and enter it above.")
     if name == "switchlight" and not bpy.app.online_access:
         reasons.append("Blender is set to work offline (Preferences, System, Network).")
@@ -63,38 +62,31 @@ def lacks(item, name: str) -> list[str]:
 def _draw_facts(layout, card: delighter_cards.Card, width: int, folded: bool) -> None:
     for field, label in delighter_cards.FACTS:
         if (field in FOLDED) == folded:
-            problems.draw_text(
-                layout, iface_("{}: {}").format(iface_(label), iface_(getattr(card, field))), width, LOOKS[field]
-            )
+            text = iface_("{}: {}").format(iface_(label), iface_(getattr(card, field)))
+            problems.draw_text(layout, text, width, LOOKS[field])
 
 
 def _draw_sending(layout, item, width: int) -> None:
-    """Whether the frames may leave the machine, and the button that says yes."""
-    known = status.of(item)
-    plan = known.sending if known is not None else None
+    """Draw whether the frames may leave the machine, and the button that allows or forbids it."""
+    capture_status = status.of(item)
+    plan = capture_status.sending if capture_status is not None else None
     if plan is None:
-        problems.draw_text(
-            layout,
-            "Which frames are sent is known once Reconstruct has chosen them: it stops then, and asks.",
-            width,
-            'INFO',
+        text = "Which frames are sent is known once Reconstruct has chosen them: it stops then, and asks."
+        problems.draw_text(layout, text, width, 'INFO')
+        return
+    if not plan.frames:
+        text = iface_("All {} answers are here. Nothing will be sent or charged.").format(plan.kept)
+        problems.draw_text(layout, text, width, 'CHECKMARK')
+        return
+    words, icon, button = (
+        ("You agreed: {} frames go to {} for {}.", 'UNLOCKED', ("wildcap.withdraw_consent", 'X'))
+        if capture_status.agreed
+        else (
+            "{} frames would go to {} for {}. Nothing is sent before you agree.",
+            'LOCKED',
+            ("wildcap.allow_sending", 'UNLOCKED'),
         )
-    elif not plan.frames:
-        problems.draw_text(
-            layout,
-            iface_("All {} answers are here. Nothing will be sent or charged.").format(plan.kept),
-            width,
-            'CHECKMARK',
-        )
-    else:
-        words = (
-            "You agreed: {} frames go to {} for {}."
-            if known.agreed
-            else "{} frames would go to {} for {}. Nothing is sent before you agree."
-        )
-        text = iface_(words).format(len(plan.frames), service.COMPANY, service.amount(plan.credits))
-        problems.draw_text(layout, text, width, 'UNLOCKED' if known.agreed else 'LOCKED')
-        layout.operator(
-            "wildcap.withdraw_consent" if known.agreed else "wildcap.allow_sending",
-            icon='X' if known.agreed else 'UNLOCKED',
-        )
+    )
+    text = iface_(words).format(len(plan.frames), service.COMPANY, service.amount(plan.credits))
+    problems.draw_text(layout, text, width, icon)
+    layout.operator(button[0], icon=button[1])

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators on what a head is made with: the head mesh that is fitted beside the built-in one, and a look at what a
-delighter did."""
+"""Operators that choose the artist's own head mesh, and compare a frame before and after delighting."""
 
 from pathlib import Path
 
@@ -15,8 +14,10 @@ from . import delighters
 
 
 class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
-    """Fit the active mesh, too: the maps are baked into its UVs in the end. It is kept in the capture as it is now,
-    without its modifiers"""
+    """Fit the active mesh as well, and bake the maps into its UVs.
+
+    The capture stores it as it is now, without its modifiers.
+    """
 
     bl_idname = "wildcap.use_active_mesh"
     bl_label = "Use Active Mesh"
@@ -39,13 +40,12 @@ class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
 
     def work(self, context):
         item, thing = captures.require(context), context.view_layer.objects.active
-        name = bpy.path.clean_name(thing.name)
-        path = captures.folder(item).root / "template" / f"{name}.obj"
+        path = captures.folder(item).root / "template" / f"{bpy.path.clean_name(thing.name)}.obj"
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise storage_problem(error, path) from error
-        selected = list(context.selected_objects)
+        selection = list(context.selected_objects)
         for other in context.view_layer.objects:
             other.select_set(other == thing)
         try:
@@ -60,13 +60,15 @@ class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
             )
         finally:
             for other in context.view_layer.objects:
-                other.select_set(other in selected)
+                other.select_set(other in selection)
         item.registration.template = str(path)
 
 
 class WILDCAP_OT_choose_template(FileOperator, CaptureOperator, bpy.types.Operator):
-    """Fit a head mesh of your own, too: an OBJ, or a folder with a neutral OBJ and its shapes, as ICT-FaceKit. Maps are
-    baked into its UVs"""
+    """Fit a head mesh of your own as well: an OBJ, or a folder with a neutral OBJ and its shapes, like ICT-FaceKit.
+
+    The maps are baked into its UVs.
+    """
 
     bl_idname = "wildcap.choose_template"
     bl_label = "Choose Head Mesh"
@@ -82,18 +84,17 @@ class WILDCAP_OT_choose_template(FileOperator, CaptureOperator, bpy.types.Operat
                 f"{path} is neither an OBJ nor a folder.",
                 "Choose an OBJ of a head, or a folder with a neutral OBJ and its shapes.",
             )
-        if path.is_dir() and not any(
-            "neutral" in file.name.lower() for file in (*path.glob("*.obj"), *path.glob("*/*.obj"))
-        ):
+        shapes = (*path.glob("*.obj"), *path.glob("*/*.obj")) if path.is_dir() else ()
+        if path.is_dir() and not any("neutral" in file.name.lower() for file in shapes):
             raise Problem(
-                f"{path} holds no OBJ with 'neutral' in its name.",
+                f"{path} contains no OBJ with 'neutral' in its name.",
                 "Choose the OBJ itself, or the folder of shapes (FaceXModel in ICT-FaceKit).",
             )
         captures.require(context).registration.template = str(path)
 
 
 class WILDCAP_OT_use_built_in_head(BaseOperator, bpy.types.Operator):
-    """Fit the built-in head alone"""
+    """Fit only the built-in head."""
 
     bl_idname = "wildcap.use_built_in_head"
     bl_label = "Built-In Head Alone"
@@ -110,21 +111,21 @@ class WILDCAP_OT_use_built_in_head(BaseOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_compare_delit(CaptureOperator, bpy.types.Operator):
-    """Show a frame before and after its light was taken out; click again for the next one"""
+    """Show a frame before and after delighting; click again for the next one."""
 
     bl_idname = "wildcap.compare_delit"
     bl_label = "Before and After"
 
     which: bpy.props.IntProperty(
-        name="Frame", default=-1, options={'SKIP_SAVE'}, description="Which of the delit frames; -1: the next one"
+        name="Frame", default=-1, options={'SKIP_SAVE'}, description="Number of the delit frame; -1: the next one"
     )
 
     def work(self, context):
         capture = captures.folder(captures.require(context))
         names = delighters.frames(capture)
         before = delighters.shown_frame(capture)
-        following = names.index(before) + 1 if before in names else len(names) // 2
-        delighters.show(capture, self.which if self.which >= 0 else following, context.window_manager.wildcap_wipe)
+        next_index = names.index(before) + 1 if before in names else len(names) // 2
+        delighters.show(capture, self.which if self.which >= 0 else next_index, context.window_manager.wildcap_wipe)
 
 
 CLASSES = (

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture's cameras as the scene needs them, read from COLMAP's binary files with the standard library alone: the
-worker's reader needs a package.
+"""Cameras of a capture, read from COLMAP's binary files without the package that the worker uses.
 
 File format: https://colmap.github.io/format.html (cameras.bin, images.bin).
 """
@@ -18,18 +17,20 @@ from ...core.capture.messages import Problem
 from ...core.capture.stages import advise_again
 
 PARAMETERS = {0: 3, 1: 4, 2: 4, 3: 5, 4: 8, 5: 8, 6: 12, 7: 5, 8: 4, 9: 5, 10: 12}
-"""Number of parameters of each camera model, by COLMAP's number for it"""
+"""Number of parameters of each camera model, by COLMAP's number for it."""
 LONGEST_SIDE_PX = 1 << 16
-"""Pixels: beyond what any picture file here may have"""
+"""Pixels, beyond any picture file."""
 TWO_FOCALS = (1, 4, 5, 6, 7, 10)
-"""Models whose parameters begin with a focal length for each axis"""
+"""Models whose parameters begin with a focal length for each axis."""
 
 
 @dataclass(frozen=True)
 class FrameCamera:
-    """Name of a registered frame, its size in pixels, focal length and principal point in pixels (of the horizontal
-    axis; without lens distortion, which Blender's camera does not have), and the camera in the capture's world as
-    Blender has cameras: looking along its -Z, +Y up."""
+    """Camera of a registered frame, sizes in pixels.
+
+    The focal length is that of the horizontal axis, without lens distortion, which Blender's camera does not have;
+    `matrix` is in the capture's world by Blender's convention, looking along -Z with +Y up.
+    """
 
     name: str
     width: int
@@ -40,7 +41,7 @@ class FrameCamera:
 
 
 def read(folder: Path) -> list[FrameCamera]:
-    """The registered frames by name. Raises Problem where there are none, or the files are damaged."""
+    """Return the registered frames by name. Raises Problem if there are none, or the files are damaged."""
     try:
         cameras = sorted(_read(folder), key=lambda camera: camera.name)
         for camera in cameras:
@@ -48,7 +49,7 @@ def read(folder: Path) -> list[FrameCamera]:
         return cameras
     except FileNotFoundError as error:
         raise Problem(
-            "This capture has no cameras yet.", "Click Reconstruct: they are found from the frames."
+            "This capture has no cameras yet.", "Click Reconstruct: they are computed from the frames."
         ) from error
     except (OSError, struct.error, KeyError, UnicodeDecodeError, ValueError) as error:
         raise Problem(
@@ -57,13 +58,13 @@ def read(folder: Path) -> list[FrameCamera]:
 
 
 def _check(camera: FrameCamera) -> None:
-    """Raises ValueError for what no camera can be, and for a name that leads out of the folder of the frames."""
+    """Raise ValueError for implausible numbers, and for a name that leads out of the folder of the frames."""
     numbers = (camera.focal, *camera.centre, *(value for row in camera.matrix for value in row))
     if not plain_name(camera.name):
-        raise ValueError(f"{camera.name!r} is no name of a frame")
-    sized = 0 < min(camera.width, camera.height) and max(camera.width, camera.height) <= LONGEST_SIDE_PX
-    if not (sized and camera.focal > 0 and all(map(math.isfinite, numbers))):
-        raise ValueError(f"the camera of {camera.name} makes no sense")
+        raise ValueError(f"{camera.name!r} is not the name of a frame")
+    has_size = 0 < min(camera.width, camera.height) and max(camera.width, camera.height) <= LONGEST_SIDE_PX
+    if not (has_size and camera.focal > 0 and all(map(math.isfinite, numbers))):
+        raise ValueError(f"the camera of {camera.name} is implausible")
 
 
 def _read(folder: Path) -> list[FrameCamera]:
@@ -82,7 +83,7 @@ def _read(folder: Path) -> list[FrameCamera]:
 
 
 def _lenses(data: bytes) -> dict[int, tuple]:
-    """Camera's number -> (width, height, focal length, principal point)."""
+    """Return camera number -> (width, height, focal length, principal point)."""
     (count,), at, lenses = struct.unpack_from("<Q", data), 8, {}
     for _ in range(count):
         number, model, width, height = struct.unpack_from("<iiQQ", data, at)

@@ -1,10 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The landmarks that placed the head, as empties on it: the artist moves those that are wrong, and the head is fitted
-again to them.
+"""Landmarks that placed the head, as empties on it: the artist corrects them, and the head is fitted again.
 
-Each empty is a child of the head, so that the head may stand anywhere; its own coordinates are those of the capture's
-world.
+Each empty is a child of the head; its own coordinates are those of the capture's world.
 """
 
 import bpy
@@ -20,8 +18,8 @@ from .. import captures, local_view
 COLLECTION = "WildCap Landmarks"
 INDEX_KEY = "wildcap_landmark"
 FOUND_KEY = "wildcap_found"
-"""Custom properties of an empty: the landmark's number, and where it was when it was shown."""
-MOVED_M = 1e-4  # less is rounding, and no landmark that was moved
+"""Custom properties of an empty: the landmark's number, and its place when it was shown."""
+MOVED_M = 1e-4  # smaller displacements are rounding
 
 # Numbers in MediaPipe's face mesh. Left and right are the person's.
 NAMES = {
@@ -58,8 +56,7 @@ NAMES = {
 
 
 def show(context, item) -> int:
-    """Puts the capture's landmarks on its head, in place of any that are shown. Returns how many. Raises Problem where
-    there are none."""
+    """Show the capture's landmarks on its head, and return how many. Raises Problem if there are none."""
     capture = captures.folder(item)
     head = captures.require_head(context, item)
     points = _known(capture)
@@ -82,25 +79,24 @@ def show(context, item) -> int:
 
 
 def shown_landmarks(item) -> list[bpy.types.Object]:
-    """Those of a list item's head; none for None."""
+    """Return the empties of a list item's head; none for None."""
     return [o for o in bpy.data.objects if INDEX_KEY in o and o.get(captures.HEAD_KEY) == item.path] if item else []
 
 
 def keep_moved(item) -> int:
-    """Writes the landmarks that were moved to the capture, where they win over what the frames say. Returns how
-    many."""
-    moved = {
+    """Store moved landmarks in the capture, where they override those of the frames, and return how many."""
+    corrections = {
         o[INDEX_KEY]: tuple(o.location)
         for o in shown_landmarks(item)
         if (o.location - Vector(o[FOUND_KEY])).length > MOVED_M
     }
-    if moved:
-        artist_landmarks.put(captures.folder(item), moved)
-    return len(moved)
+    if corrections:
+        artist_landmarks.put(captures.folder(item), corrections)
+    return len(corrections)
 
 
 def hide(item) -> None:
-    """Takes the empties of a list item's head off the scene."""
+    """Remove the empties of a list item's head."""
     for empty in shown_landmarks(item):
         bpy.data.objects.remove(empty)
     for collection in [c for c in bpy.data.collections if c.name.startswith(COLLECTION) and not c.all_objects]:
@@ -108,13 +104,13 @@ def hide(item) -> None:
 
 
 def _known(capture: Capture) -> dict[int, list[float]]:
-    """Where the landmarks are: as found, and over that as the artist has put them."""
+    """Return the landmarks' places, those of the artist over the detected ones."""
     try:
         detected = read_json(capture.landmarks)["points"]
         points = {int(index): [float(v) for v in point] for index, point in detected.items()}
     except FileNotFoundError as error:
         raise Problem(
-            "This capture has no landmarks.", "Click Reconstruct first: they are found in the frames."
+            "This capture has no landmarks.", "Click Reconstruct first: they are detected in the frames."
         ) from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise Problem(

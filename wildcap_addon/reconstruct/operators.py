@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: reconstruct the head up to the mask proposal, cancel, and bring the head into the scene."""
+"""Operators: reconstruct the head up to the mask proposal, cancel, and bring results into the scene."""
 
 import bpy
 
@@ -12,7 +12,7 @@ from . import evidence, landmarks
 
 
 class WILDCAP_OT_reconstruct(JobOperator, bpy.types.Operator):
-    """Turn the video into a textured head and propose its shadow mask; finished stages are not done twice"""
+    """Turn the video into a textured head and propose its shadow mask; finished stages are not repeated."""
 
     bl_idname = "wildcap.reconstruct"
     bl_label = "Reconstruct"
@@ -20,30 +20,25 @@ class WILDCAP_OT_reconstruct(JobOperator, bpy.types.Operator):
     first: bpy.props.StringProperty(
         name="From",
         options={'SKIP_SAVE'},
-        description="The stage to begin with, done again even if it is fresh; empty: what is not done yet",
+        description="Stage to begin with, even if it is fresh; empty: the first that is not done",
     )
 
     to_end: bpy.props.BoolProperty(
-        name="To the End", options={'SKIP_SAVE'}, description="Go on past the mask, to what is delivered"
+        name="To the End", options={'SKIP_SAVE'}, description="Go on past the mask, to the end of the chain"
     )
 
     @classmethod
     def description(cls, context, properties):
         if properties.to_end:
-            return "Fit your own mesh and texture the scan; of what comes before, only stages that are out of date run"
+            return "Fit your own mesh and texture the scan; earlier stages run only if they are out of date"
         if properties.first not in stages.NAMES:
             return cls.bl_description
-        after_mask = stages.NAMES.index(properties.first) > stages.NAMES.index(stages.MASK_STAGE)
-        end = "to the end" if after_mask else "up to the mask"
-        return f"Run from the stage {stages.by_name(properties.first).label}, also where it is done, {end}"
+        end = "to the end" if _is_after_mask(properties.first) else "up to the mask"
+        return f"Run from the stage {stages.by_name(properties.first).label} {end}, even if it is done"
 
     def work(self, context):
         item = captures.require(context)
-        after_mask = (
-            self.to_end
-            or self.first
-            and stages.NAMES.index(stages.by_name(self.first).name) > stages.NAMES.index(stages.MASK_STAGE)
-        )
+        after_mask = self.to_end or self.first and _is_after_mask(self.first)
         if not after_mask and not captures.folder(item).source:
             raise Problem(
                 "This capture has no video: there is nothing to reconstruct it from.",
@@ -57,15 +52,20 @@ class WILDCAP_OT_reconstruct(JobOperator, bpy.types.Operator):
         )
 
 
+def _is_after_mask(stage: str) -> bool:
+    """Return whether a stage comes after the mask. Raises Problem for an unknown one."""
+    return stages.NAMES.index(stages.by_name(stage).name) > stages.NAMES.index(stages.MASK_STAGE)
+
+
 class WILDCAP_OT_cancel(BaseOperator, bpy.types.Operator):
-    """Stop the running job; what is finished is kept"""
+    """Stop the running job; finished stages are kept."""
 
     bl_idname = "wildcap.cancel"
     bl_label = "Cancel"
 
     capture: bpy.props.StringProperty(
         name="Capture",
-        description="Folder of the capture whose job is meant; empty: the active one",
+        description="Folder of the capture whose job is cancelled; empty: the active one",
         options={'SKIP_SAVE'},
     )
 
@@ -81,11 +81,10 @@ class WILDCAP_OT_cancel(BaseOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_bring_in_head(HeadOperator, bpy.types.Operator):
-    """Bring the reconstructed head into this scene, or update it in place"""
+    """Bring the reconstructed head into this scene, or update it in place."""
 
     bl_idname = "wildcap.bring_in_head"
     bl_label = "Bring In Head"
-    bl_options = {'REGISTER', 'UNDO'}
 
     def work(self, context):
         item = captures.require(context)
@@ -96,11 +95,10 @@ class WILDCAP_OT_bring_in_head(HeadOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_bring_in_cameras(HeadOperator, bpy.types.Operator):
-    """Bring in the cameras that took the frames, each with its frame behind the head; or update them in place"""
+    """Bring in the cameras of the frames, each with its frame behind the head, or update them in place."""
 
     bl_idname = "wildcap.bring_in_cameras"
     bl_label = "Bring In Cameras"
-    bl_options = {'REGISTER', 'UNDO'}
 
     every: bpy.props.BoolProperty(
         name="Every Frame", default=False, description="All registered frames; off: those that the texture is made from"
@@ -111,30 +109,33 @@ class WILDCAP_OT_bring_in_cameras(HeadOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_bring_in_scan(HeadOperator, bpy.types.Operator):
-    """Bring in the scan that the head was fitted to, or update it in place"""
+    """Bring in the scan that the head was fitted to, or update it in place."""
 
     bl_idname = "wildcap.bring_in_scan"
     bl_label = "Bring In Scan"
-    bl_options = {'REGISTER', 'UNDO'}
 
     def work(self, context):
         evidence.bring_in_scan(context, captures.require(context))
 
 
 class WILDCAP_OT_show_landmarks(HeadOperator, bpy.types.Operator):
-    """Show the landmarks that placed the head as small spheres on it: move those that are wrong, then click Fit Head
-    Again"""
+    """Show the head's landmarks as small spheres: move those that are wrong, then click Fit Head Again."""
 
     bl_idname = "wildcap.show_landmarks"
     bl_label = "Show Landmarks"
-    bl_options = {'REGISTER', 'UNDO'}
 
     def work(self, context):
         landmarks.show(context, captures.require(context))
 
 
+def _with_landmarks(operator, context) -> bool:
+    return operator.in_object_mode(context) and operator.allowed(
+        landmarks.shown_landmarks(captures.active(context)), "No landmarks are shown: click Show Landmarks first"
+    )
+
+
 class WILDCAP_OT_hide_landmarks(BaseOperator, bpy.types.Operator):
-    """Take the landmarks off the head without fitting it again; the capture keeps what was kept before"""
+    """Hide the landmarks without fitting the head again; corrections stored earlier are kept."""
 
     bl_idname = "wildcap.hide_landmarks"
     bl_label = "Hide Landmarks"
@@ -142,16 +143,14 @@ class WILDCAP_OT_hide_landmarks(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return cls.in_object_mode(context) and cls.allowed(
-            landmarks.shown_landmarks(captures.active(context)), "No landmarks are shown: click Show Landmarks first"
-        )
+        return _with_landmarks(cls, context)
 
     def work(self, context):
         landmarks.hide(captures.require(context))
 
 
 class WILDCAP_OT_fit_landmarks(BaseOperator, bpy.types.Operator):
-    """Keep the landmarks that were moved, and fit the head again: they win over what was found in the frames"""
+    """Store the landmarks that were moved, and fit the head again; they override those of the frames."""
 
     bl_idname = "wildcap.fit_landmarks"
     bl_label = "Fit Head Again"
@@ -159,10 +158,7 @@ class WILDCAP_OT_fit_landmarks(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        shown = cls.in_object_mode(context) and cls.allowed(
-            landmarks.shown_landmarks(captures.active(context)), "No landmarks are shown: click Show Landmarks first"
-        )
-        return shown and jobs.can_start(cls, context)
+        return _with_landmarks(cls, context) and jobs.can_start(cls, context)
 
     def work(self, context):
         item = captures.require(context)

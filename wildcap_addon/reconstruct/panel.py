@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panels: what the artist may choose up to the mask proposal, and the settings of those stages."""
+"""Panels of the stages up to the mask proposal, their choices and settings."""
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -20,18 +20,16 @@ class WILDCAP_PT_reconstruct(CapturePanel, bpy.types.Panel):
         layout.use_property_split = True
         item = captures.active(context)
         layout.prop(item, "quality")
-        row = layout.row(align=True)
-        row.operator("wildcap.reconstruct")
+        layout.operator("wildcap.reconstruct")
         row = layout.row(align=True)
         for name, icon in (("head", 'MESH_MONKEY'), ("cameras", 'CAMERA_DATA'), ("scan", 'OUTLINER_DATA_POINTCLOUD')):
             row.operator(f"wildcap.bring_in_{name}", text=name.title(), icon=icon)
         row = layout.row(align=True)
-        row.operator(
-            "wildcap.hide_landmarks" if landmarks.shown_landmarks(item) else "wildcap.show_landmarks", icon='EMPTY_AXIS'
-        )
+        action = "hide" if landmarks.shown_landmarks(item) else "show"
+        row.operator(f"wildcap.{action}_landmarks", icon='EMPTY_AXIS')
         row.operator("wildcap.fit_landmarks")
         for stage in stages.STAGES[: stages.NAMES.index(stages.MASK_STAGE) + 1]:
-            if stage.name != "delight":  # all of its settings stand below
+            if stage.name != "delight":  # the Delighter panel has its settings
                 draw_settings(layout, item, stage, without=("template", "new_atlas"))
 
 
@@ -68,13 +66,8 @@ class WILDCAP_PT_delighter(CapturePanel, bpy.types.Panel):
         name = delighters.shown_frame(capture)
         if name:
             layout.template_icon(icon_value=delighters.icon(), scale=11)
-            layout.prop(
-                context.window_manager,
-                "wildcap_wipe",
-                text=iface_("Frame {}").format(name),
-                translate=False,
-                slider=True,
-            )
+            text = iface_("Frame {}").format(name)
+            layout.prop(context.window_manager, "wildcap_wipe", text=text, translate=False, slider=True)
 
 
 CLASSES = (WILDCAP_PT_reconstruct, WILDCAP_PT_head_mesh, WILDCAP_PT_delighter)

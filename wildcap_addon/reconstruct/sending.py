@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: agree that a paid service gets frames of this capture, told first what leaves the machine, to whom and for
-how much; and take that back."""
+"""Operators: consent to sending frames of this capture to a paid service, and withdraw it."""
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -12,12 +11,14 @@ from .. import captures, frame_icons, preferences, properties
 from ..base_operator import CaptureOperator, Dialog
 
 COLUMNS, ICON_SCALE = 6, 4.0
-"""Of the pictures in the dialog: how many side by side, and how many buttons high each is."""
+"""Pictures in the dialog: number per row, and height in buttons."""
 
 
 class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
-    """Agree that SwitchLight gets the chosen frames of this capture: first you are told what leaves your machine, who
-    gets it, and what it costs. Nothing is sent before that"""
+    """Agree to send the chosen frames of this capture to SwitchLight.
+
+    A dialog first shows what leaves your machine, who gets it, and what it costs.
+    """
 
     bl_idname = "wildcap.allow_sending"
     bl_label = "Allow Sending"
@@ -56,8 +57,7 @@ class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
 
 
 class WILDCAP_OT_withdraw_consent(CaptureOperator, bpy.types.Operator):
-    """Take your consent back: no frame of this capture is sent any more. What SwitchLight has answered stays in the
-    capture"""
+    """Withdraw your consent: no more frames of this capture are sent. SwitchLight's answers stay in the capture."""
 
     bl_idname = "wildcap.withdraw_consent"
     bl_label = "Withdraw Consent"
@@ -67,7 +67,7 @@ class WILDCAP_OT_withdraw_consent(CaptureOperator, bpy.types.Operator):
 
 
 def plan(item) -> consent.Sending:
-    """What would be sent of a capture. Raises Problem where nothing can be, or need be."""
+    """Return the frames to send. Raises Problem if there are none, or Blender is offline."""
     preferences.require_online("choose another delighter")
     sending = consent.sending(captures.folder(item), properties.settings(item).delight.switchlight_preview)
     if not sending.frames:

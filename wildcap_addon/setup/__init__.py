@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solver: in an environment of its own or in an existing Python; whether it answers, and whether it solves as it
-should."""
+"""Environment of the solver: installation or an existing Python, checks, and the self-test."""
 
 import bpy
 

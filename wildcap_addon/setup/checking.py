@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the solver's Python answers: asked in a thread when Blender has started, and, with every package loaded once,
-after it was chosen.
+"""Background checks of the solver's Python: at Blender's start, and with all packages loaded after a new choice.
 
-One that does not answer is set aside, and the tab shows the first steps again.
+One that fails is set aside, and the tab shows the first steps again.
 """
 
 from pathlib import Path
@@ -17,27 +16,26 @@ from .. import jobs, preferences, problems, status
 
 REQUIREMENTS = jobs.ROOT / "requirements"
 FIRST_S, INTERVAL_S = 2.0, 0.5
-_checks: list[BackgroundTask] = []  # the one under way or done, if any
+_checks: list[BackgroundTask] = []  # the running or finished one, if any
 
 
 def judge(python: Path, importing: bool) -> tuple[str, str]:
-    """The device that a Python computes on, and why; '' if its packages are not loaded. Raises Problem where it cannot
-    run the solver."""
+    """Return the device that a Python computes on, and why; '' without `importing` its packages.
+
+    Raises Problem if it cannot run the solver.
+    """
     probe = environment.survey(python, REQUIREMENTS, importing)
-    refuse(python, environment.judge(probe, REQUIREMENTS))
-    return (probe["device"], probe["reason"]) if importing else ("", "")
-
-
-def refuse(python: Path, faults: list[str]) -> None:
+    faults = environment.judge(probe, REQUIREMENTS)
     if faults:
         raise Problem(
             f"{python} cannot run the solver. {' '.join(faults[:3])}",
             f"Install what {REQUIREMENTS / 'worker.txt'} lists; or click Install Solver, which brings it up to date.",
         )
+    return (probe["device"], probe["reason"]) if importing else ("", "")
 
 
 def accept(python: Path) -> None:
-    """Makes it the solver's Python, and has a closer look in the background."""
+    """Make it the solver's Python, and examine it more closely in the background."""
     preferences.set_python(python)
     _checks.clear()
     if not bpy.app.timers.is_registered(look):
@@ -45,7 +43,7 @@ def accept(python: Path) -> None:
 
 
 def look() -> float | None:
-    """The timer: starts the look, and takes in how it ended."""
+    """Start the check, and process its result. The timer's function."""
     python = preferences.python()
     if python is None:
         return None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that make the solver's environment and take it away; each says first what that means in gigabytes."""
+"""Operators that install and remove the solver's environment; each first shows its size."""
 
 import os
 from pathlib import Path
@@ -17,8 +17,10 @@ COMPUTES = {"cpu": "the CPU", "cuda": "NVIDIA GPUs (CUDA)", "apple": "Apple GPUs
 
 
 class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
-    """Install the solver's packages into a folder of their own: first you are told what, how much, from where and to
-    where. Blender's Python stays as it is"""
+    """Install the solver's packages into a folder of their own; Blender's Python is not changed.
+
+    A dialog first shows what is downloaded, how much, from where and to where.
+    """
 
     bl_idname = "wildcap.install_solver"
     bl_label = "Install Solver"
@@ -29,29 +31,26 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
 
     @staticmethod
     def tell() -> tuple[str, ...] | None:
-        compute, source, wheels, folder = *chosen_packages(), preferences.environment_folder()
-        plan = asking.answer(("plan", compute, source, wheels))
-        if plan is None:
-            asking.find_answer(
-                ("plan", compute, source, wheels),
-                lambda task: look_up_plan(task, compute, source, wheels, folder),
-                "install_solver",
-            )
-            return None
-        return describe_plan(plan, compute, folder, index.check_space(plan, folder))
+        (compute, source, wheels), folder = chosen_packages(), preferences.environment_folder()
+        plan = asking.find_answer(
+            ("plan", compute, source, wheels),
+            "looking for a Python to begin with",
+            lambda task: look_up_plan(task, compute, source, wheels, folder),
+            "install_solver",
+        )
+        return describe_plan(plan, compute, folder, index.check_space(plan, folder)) if plan else None
 
     def work(self, context):
-        compute, source, wheels, folder = *chosen_packages(), preferences.environment_folder()
-        plan = asking.answer(("plan", compute, source, wheels))
+        packages, folder = chosen_packages(), preferences.environment_folder()
+        plan = asking.answer(("plan", *packages))
         if plan is not None:
             index.check_space(plan, folder)
-        log = folder.with_name(f"{folder.name}.wildcap-install.log")
         task = installation.installation(
             folder,
             REQUIREMENTS,
-            log,
+            folder.with_name(f"{folder.name}.wildcap-install.log"),
             None,
-            installation.PackageSource(compute, source, wheels),
+            installation.PackageSource(*packages),
             len(plan.packages) if plan is not None else 0,
         )
         asking.forget(("size", str(folder)))
@@ -59,8 +58,10 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
 
 
 class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
-    """Delete the folder that Install Solver made, including one that it did not finish; you are told first how much
-    that frees. Captures stay"""
+    """Delete the folder that Install Solver made, even if incomplete; captures stay.
+
+    A dialog first shows how much that frees.
+    """
 
     bl_idname = "wildcap.remove_solver"
     bl_label = "Remove Solver"
@@ -76,9 +77,13 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
     @staticmethod
     def tell() -> tuple[str, ...] | None:
         folder = preferences.environment_folder()
-        size = asking.answer(("size", str(folder)))
+        size = asking.find_answer(
+            ("size", str(folder)),
+            "adding up what the solver takes",
+            lambda task: index.folder_size(folder),
+            "remove_solver",
+        )
         if size is None:
-            asking.find_answer(("size", str(folder)), lambda task: measure(task, folder), "remove_solver")
             return None
         return (
             iface_("Deletes {} and frees {}.").format(folder, index.gigabytes(size)),
@@ -95,33 +100,22 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
 
 
 def describe_plan(plan: index.InstallationPlan, compute: str, folder: Path, free: int) -> tuple[str, ...]:
-    """What an installation means, before the artist says yes.
-
-    Parameters
-    ----------
-    plan : of the installation
-    compute : a key of COMPUTES
-    folder : installed to
-    free : bytes on that folder's disk
-
-    Returns
-    -------
-    The dialog's lines.
-    """
+    """Return the dialog's lines; `free` is in bytes."""
     torch, others = plan.packages.get("torch", ""), len(plan.packages) - 1
+    download, disk, free = map(index.gigabytes, (plan.download, plan.disk, free))
     return (
         iface_("PyTorch {} for {} and {} more packages.").format(torch, iface_(COMPUTES[compute]), others),
-        iface_("{} to download from {}.").format(index.gigabytes(plan.download), ", ".join(plan.hosts)),
-        iface_("{} on disk in {}, where {} are free.").format(
-            index.gigabytes(plan.disk), folder, index.gigabytes(free)
-        ),
+        iface_("{} to download from {}.").format(download, ", ".join(plan.hosts)),
+        iface_("{} on disk in {}, where {} are free.").format(disk, folder, free),
         "You can go on working meanwhile, cancel, and continue later.",
     )
 
 
 def chosen_packages() -> tuple[str, str, Path | None]:
-    """(compute, source, wheels) of the preferences, with what Automatic means here. Raises Problem for what cannot be
-    here, and while Blender is to stay off a network that is needed."""
+    """Return (compute, source, wheels) of the preferences, with Automatic resolved.
+
+    Raises Problem for choices that are impossible on this machine, or need a network while Blender is offline.
+    """
     source = preferences.get().packages
     if source != 'folder':
         preferences.require_online(
@@ -131,32 +125,14 @@ def chosen_packages() -> tuple[str, str, Path | None]:
 
 
 def look_up_plan(task, compute: str, source: str, wheels: Path | None, folder: Path) -> index.InstallationPlan:
-    """Asks the package index what an installation would bring.
+    """Ask the package index about an installation. `task` runs pip and shows the progress.
 
-    Parameters
-    ----------
-    task : says how far it is, and runs pip
-    compute : a key of COMPUTES
-    source : as the preferences have it under Packages From
-    wheels : their folder; None where they come from the index
-    folder : installed to
-
-    Raises
-    ------
-    Problem
-        Where there is no Python to begin with or no solver for this machine, the folder's path is too long, or the
-        index cannot be reached or lacks a package.
+    Raises Problem if there is no Python to begin with or no solver for this machine, if the folder's path is too long,
+    or if the index cannot be reached or lacks a package.
     """
-    task.say(0, 4, "looking for a Python to begin with")
     base = installation.base_python()
     locks.check_path(pip_steps.lock_of(base, REQUIREMENTS), folder, limited=os.name == "nt")
     return index.plan_installation(REQUIREMENTS, base, compute, source, task.run, task.say, wheels)
-
-
-def measure(task, folder) -> int:
-    """Bytes that removing the folder frees."""
-    task.say(0, 1, "adding up what the solver takes")
-    return index.folder_size(folder)
 
 
 CLASSES = (WILDCAP_OT_install_solver, WILDCAP_OT_remove_solver)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operator: use a Python that has the solver's packages already."""
+"""Operator that chooses a Python with the solver's packages."""
 
 import os
 from pathlib import Path
@@ -9,14 +9,13 @@ import bpy
 
 from ...core.capture.messages import Problem
 from ...core.worker import environment
-from ...core.worker.background import BackgroundTask
-from .. import jobs, preferences
+from .. import asking, jobs, preferences
 from ..base_operator import FileOperator
 from . import checking
 
 
 class WILDCAP_OT_use_python(FileOperator, bpy.types.Operator):
-    """Choose a Python, or the folder of a virtual environment, that has the solver's packages"""
+    """Choose a Python, or the folder of a virtual environment, that has the solver's packages."""
 
     bl_idname = "wildcap.use_python"
     bl_label = "Use an Existing Python"
@@ -30,22 +29,23 @@ class WILDCAP_OT_use_python(FileOperator, bpy.types.Operator):
     def work(self, context):
         python = interpreter(Path(bpy.path.abspath(self.filepath)))
         if self.options.is_invoke:
-            jobs.start_worker(
-                "", "ask", BackgroundTask("setup", lambda task: try_out(task, python)), lambda: checking.accept(python)
-            )
+            try_out(python)
         else:  # a script waits for the answer
             checking.judge(python, importing=False)
             preferences.set_python(python)
 
 
-def try_out(task: BackgroundTask, python: Path) -> None:
-    """Raises Problem where a Python lacks something."""
-    task.say(0, 1, "asking that Python what it has")
-    checking.judge(python, importing=False)
+def try_out(python: Path) -> None:
+    """Check a Python in the background, and make it the solver's if it has the packages."""
+    asking.run(
+        "asking that Python what it has",
+        lambda task: checking.judge(python, importing=False),
+        lambda _: checking.accept(python),
+    )
 
 
 def interpreter(path: Path) -> Path:
-    """The Python meant by a file or by a virtual environment's folder. Raises Problem when there is none."""
+    """Return the Python of a file's or a virtual environment's path. Raises Problem if there is none."""
     for candidate in (path, environment.python_of(path), path / "python.exe"):
         if candidate.is_file() and os.access(candidate, os.X_OK):
             return candidate

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel: the first steps, and later whether the solver works. The same is in the extension's preferences."""
+"""Panel of the solver, also shown in the extension's preferences."""
 
 import bpy
 

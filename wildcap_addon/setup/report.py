@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operator: save a report about a problem, to be sent by whoever wants to. Nothing is sent here."""
+"""Operator that saves a report about a problem, for the artist to send. Nothing is sent here."""
 
 import time
 from pathlib import Path
@@ -10,14 +10,15 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.capture.messages import Problem
 from ...core.worker import problem_report
-from ...core.worker.background import BackgroundTask
-from .. import captures, jobs, preferences, problems
+from .. import asking, captures, jobs, preferences, problems
 from ..base_operator import FileOperator
 
 
 class WILDCAP_OT_save_report(FileOperator, bpy.types.Operator):
-    """Save a zip with logs, versions and settings, to send with a question: no pictures, no names, no paths of yours.
-    Nothing is sent"""
+    """Save a zip with logs, versions and settings, without pictures, names and paths, to send with a question.
+
+    Nothing is sent.
+    """
 
     bl_idname = "wildcap.save_report"
     bl_label = "Save Report"
@@ -35,41 +36,20 @@ class WILDCAP_OT_save_report(FileOperator, bpy.types.Operator):
 
     def work(self, context):
         if not self.filepath:
-            raise Problem("No file was chosen for the report.", "Click Save Report and say where it goes.")
+            raise Problem("No file was chosen for the report.", "Click Save Report and choose a file.")
         target, python = Path(bpy.path.abspath(self.filepath)), preferences.python()
-        item = captures.active(context)
+        item, blender = captures.active(context), bpy.app.version_string
         capture = captures.folder(item) if item is not None else None
-        blender = bpy.app.version_string
-        task = BackgroundTask("setup", lambda task: save_report(task, target, python, capture, blender))
-        jobs.start_worker("", "ask", task, lambda: tell(task.result))
+        asking.run(
+            "writing the report",
+            lambda task: problem_report.write(target, jobs.ROOT, python, capture, Blender=blender),
+            _show,
+        )
 
 
-def save_report(task: BackgroundTask, target: Path, python, capture, blender: str) -> Path:
-    """Writes the report in the background.
-
-    Parameters
-    ----------
-    task : says how far it is
-    target : the zip; .zip is added where it lacks
-    python : of the worker; None where there is none
-    capture : told of; None where there is none
-    blender : its version
-
-    Returns
-    -------
-    The zip that was written.
-
-    Raises
-    ------
-    Problem
-        Where the file is there already, or cannot be written.
-    """
-    task.say(0, 1, "writing the report")
-    return problem_report.write(target, jobs.ROOT, python, capture, Blender=blender)
-
-
-def tell(target: Path) -> None:
-    problems.show("", problems.Notice(iface_("The report is {}.").format(target), "Look into it before you send it."))
+def _show(target: Path) -> None:
+    text = iface_("The report is {}.").format(target)
+    problems.show("", problems.Notice(text, "Read it before you send it."))
 
 
 CLASSES = (WILDCAP_OT_save_report,)

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operator: the sample head solved again on this machine, in a folder that Blender takes away when it closes; captures
-are not touched."""
+"""Operator that solves the sample head on this machine, in a temporary folder."""
 
 import shutil
 import tempfile
@@ -17,8 +16,10 @@ from ..base_operator import BaseOperator
 
 
 class WILDCAP_OT_self_test(BaseOperator, bpy.types.Operator):
-    """Solve the sample head again on this machine, compare it with what it should be, and say how long that took. Your
-    captures are not touched"""
+    """Solve the sample head on this machine, compare the result with the shipped one, and measure the time.
+
+    Your captures are not changed.
+    """
 
     bl_idname = "wildcap.self_test"
     bl_label = "Self-Test"
@@ -29,7 +30,7 @@ class WILDCAP_OT_self_test(BaseOperator, bpy.types.Operator):
             cls.allowed(preferences.python() is not None, "There is no solver to test yet: click Install Solver")
             and cls.allowed(jobs.of("") is None, "The solver is being set up: wait for it, or click Cancel")
             and cls.allowed(
-                not jobs.elsewhere(""), "The solver is at work: wait for it, so that the seconds mean something"
+                not jobs.elsewhere(""), "The solver is at work: wait for it, or the measured time would be wrong"
             )
         )
 
@@ -42,17 +43,13 @@ class WILDCAP_OT_self_test(BaseOperator, bpy.types.Operator):
 
 
 def tell(figures: dict) -> None:
-    """Shows how the test went, and keeps it in the preferences."""
-    said = iface_("The solver works: {} dB where {} or more were expected, in {} s.").format(
+    """Show the result of the test, and store it in the preferences."""
+    text = iface_("The solver works: {} dB where {} or more were expected, in {} s.").format(
         *(f"{figures[name]:.1f}" for name in ("score_db", "expected_db")), f"{figures['seconds']:.0f}"
     )
-    preferences.get().tested = said
-    problems.show(
-        "",
-        problems.Notice(
-            said, "The sample head was solved again on this machine, and compared with the one that is shipped."
-        ),
-    )
+    preferences.get().tested = text
+    remedy = "The sample head was solved again on this machine, and compared with the shipped one."
+    problems.show("", problems.Notice(text, remedy))
 
 
 CLASSES = (WILDCAP_OT_self_test,)

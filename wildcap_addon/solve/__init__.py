@@ -5,7 +5,7 @@
 import bpy
 
 from .. import incoming
-from . import eyedropper, live, operators, panel, preview, white_card
+from . import eyedropper, live, operators, panel, white_card
 
 RESULTS = incoming.Results(live.take, live.waits)
 _register, _unregister = bpy.utils.register_classes_factory(
@@ -21,5 +21,4 @@ def register():
 def unregister():
     incoming.on_results.remove(RESULTS)
     _unregister()
-    preview.forget()
     live.forget()

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The running solve's albedo on the head itself: an image node in its material, made by the click on Solve, that the
-timer reads anew.
+"""Albedo of the running solve on the head: an image node in its material, made by Solve and reloaded by the timer.
 
-Solid shading shows a material's active image node, so nothing is linked and the artist's own nodes stay. While somebody
-paints or edits, nothing is touched.
+Solid shading shows a material's active image node, so no links are needed and the artist's own nodes are kept. Nothing
+changes while somebody paints or edits.
 """
 
 from pathlib import Path
@@ -14,16 +13,16 @@ import bpy
 from ...core.capture.capture import Capture
 from .. import captures, head, jobs
 
-_ended: set[str] = set()  # captures whose solve has ended while somebody painted
+_ended: set[str] = set()  # captures whose solve ended during painting
 
 
 def waits(root: str) -> bool:
-    """Whether a capture's heads still show a solve that has ended."""
+    """Return whether a capture's heads still show a solve that has ended."""
     return root in _ended
 
 
 def take(_context, item) -> None:
-    """What waited for the end of a painting; called in Object Mode."""
+    """Finish what waited for the end of painting; called in Object Mode."""
     if captures.root(item) in _ended:
         update(captures.root(item))
 
@@ -33,8 +32,7 @@ def forget() -> None:
 
 
 def prepare(context, item) -> None:
-    """Puts the node into the head's material, for `update` to show once there is a picture. Without a head or a
-    material there is nothing to show it on."""
+    """Put the node into the material of the head, if there is one, for `update` to show."""
     obj = captures.head(context, item)
     material = obj.data.materials[0] if obj is not None and obj.data.materials else None  # others are eyes and mouth
     if material is None or material.node_tree is None:
@@ -55,16 +53,18 @@ def prepare(context, item) -> None:
 
 
 def update(root: str) -> None:
-    """Shows the newest picture of the capture's solve on its heads, and what they showed before once it has ended, or
-    once nobody paints any more. Makes no data-blocks."""
-    ended = jobs.of(root) is None
+    """Show the newest picture of the solve on the capture's heads; after its end, and after painting, what was before.
+
+    Makes no data-blocks.
+    """
+    has_ended = jobs.of(root) is None
     _ended.discard(root)
-    if ended and bpy.context.mode == 'PAINT_TEXTURE':
-        _ended.add(root)  # the active node may be what is painted on
-    if root in _ended or not ended and bpy.context.mode != 'OBJECT':
+    if has_ended and bpy.context.mode == 'PAINT_TEXTURE':
+        _ended.add(root)  # the active node may be the canvas
+    if root in _ended or not has_ended and bpy.context.mode != 'OBJECT':
         return
     for nodes, node in _nodes(root):
-        if ended:
+        if has_ended:
             nodes.active = nodes.get(node.get("before", "")) or nodes.active
         elif Path(bpy.path.abspath(node.image.filepath)).is_file():
             node.image.reload()
@@ -77,11 +77,8 @@ def update(root: str) -> None:
 
 def _nodes(root: str):
     preview = str(Capture(root).preview)
-    for material in bpy.data.materials:
-        node = material.node_tree.nodes.get(head.PREVIEW) if material.node_tree is not None else None
-        if (
-            node is not None
-            and node.image is not None
-            and str(Path(bpy.path.abspath(node.image.filepath)).parent) == preview
-        ):
-            yield material.node_tree.nodes, node
+    for tree in (material.node_tree for material in bpy.data.materials if material.node_tree is not None):
+        node = tree.nodes.get(head.PREVIEW)
+        if node is not None and node.image is not None:
+            if str(Path(bpy.path.abspath(node.image.filepath)).parent) == preview:
+                yield tree.nodes, node

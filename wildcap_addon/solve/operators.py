@@ -1,17 +1,17 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: solve the maps from the texture and the mask, whole or where the mask was edited, and enlarge them."""
+"""Operators: solve the maps, whole or where the mask was edited, and estimate the skin tone."""
 
 import bpy
 
 from ...core.capture.messages import Problem
 from .. import captures, jobs, status, undo
 from ..base_operator import BaseOperator, JobOperator
-from . import live, preview
+from . import live
 
 
 class WILDCAP_OT_solve(JobOperator, bpy.types.Operator):
-    """Take light and shadow out of the texture; continues from the last checkpoint after a cancel"""
+    """Remove light and shadow from the texture; after a cancel, continue from the last checkpoint."""
 
     bl_idname = "wildcap.solve"
     bl_label = "Solve"
@@ -26,7 +26,7 @@ class WILDCAP_OT_solve(JobOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_solve_edited(BaseOperator, bpy.types.Operator):
-    """Solve only the part of the maps that the last mask edit touched; everything else of them stays as it is"""
+    """Solve only the part of the maps that the last mask edit touched."""
 
     bl_idname = "wildcap.solve_edited"
     bl_label = "Solve the Edited Part"
@@ -36,9 +36,9 @@ class WILDCAP_OT_solve_edited(BaseOperator, bpy.types.Operator):
     def poll(cls, context):
         if not jobs.can_start(cls, context):
             return False
-        known = status.of(captures.active(context))
-        return cls.allowed(known is not None, "Looking at the capture ...") and cls.allowed(
-            not known.whole_solve, f"{known.whole_solve} Click Solve for the whole map"
+        capture_status = status.of(captures.active(context))
+        return cls.allowed(capture_status is not None, "Looking at the capture ...") and cls.allowed(
+            not capture_status.whole_solve, f"{capture_status.whole_solve} Click Solve for the whole map"
         )
 
     def work(self, context):
@@ -46,8 +46,10 @@ class WILDCAP_OT_solve_edited(BaseOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_estimate_skin_tone(JobOperator, bpy.types.Operator):
-    """Look at the skin outside of the shadow mask in all frames, and set the skin tone from it, with how sure it is; a
-    measured white point helps most"""
+    """Estimate the skin tone and its uncertainty from the skin outside the shadow mask, in all frames.
+
+    A measured white point improves it most.
+    """
 
     bl_idname = "wildcap.estimate_skin_tone"
     bl_label = "Estimate"
@@ -62,23 +64,20 @@ class WILDCAP_OT_estimate_skin_tone(JobOperator, bpy.types.Operator):
         job = jobs.start_tool(captures.require(context), "skin_tone", then=then)
 
 
-def begin(context, item, **shared) -> None:
-    """Starts a capture's solve, or puts it in line, and makes its head ready to show how far it is. Raises Problem when
-    it cannot."""
-    jobs.start(item, "solve", first="solve", **shared).on_preview = live.update
-    preview.forget()
+def begin(context, item, **once) -> None:
+    """Start a capture's solve, or put it in line, and prepare its head for the preview. Raises Problem if it cannot."""
+    jobs.start(item, "solve", first="solve", **once).on_preview = live.update
     live.prepare(context, item)
 
 
 def set_tone(root: str, figures: dict) -> None:
-    """The estimated tone into the settings of the capture, in whichever scene lists it."""
-    for item in captures.listed():
-        if captures.root(item) == root:
-            item.skin_tone, item.use_skin_tone = figures["skin_tone_srgb"], True
-            item.estimated_tone = figures["skin_tone_srgb"]
-            item.tone_group = figures.get("skin_tone_group", "")
-            item.tone_source = figures.get("skin_tone_source", "")
-            item.tone_deviation = figures.get("skin_tone_deviation_l", 0.0)
+    """Store the estimated tone in the capture's settings, in all scenes."""
+    for item in captures.of_root(root):
+        item.use_skin_tone, item.skin_tone = True, figures["skin_tone_srgb"]
+        item.estimated_tone = figures["skin_tone_srgb"]
+        item.tone_group = figures.get("skin_tone_group", "")
+        item.tone_source = figures.get("skin_tone_source", "")
+        item.tone_deviation = figures.get("skin_tone_deviation_l", 0.0)
 
 
 CLASSES = (WILDCAP_OT_solve, WILDCAP_OT_solve_edited, WILDCAP_OT_estimate_skin_tone)

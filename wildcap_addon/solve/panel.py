@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel: quality, skin tone and the solver's settings; the preview while it runs."""
+"""Panels: quality, skin tone and the solver's settings; the preview while it runs."""
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -35,7 +35,7 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         layout.use_property_split = True
         item = captures.active(context)
         layout.prop(item, "quality")
-        # not tried yet: the CPU is there in any case
+        # before the devices are tried: the CPU always exists
         times = timings.describe_minutes(properties.device(item).replace("auto", "cpu"))
         if times:
             layout.label(text=times, icon='TIME')
@@ -54,23 +54,18 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         row.operator("wildcap.solve")
         row.operator("wildcap.solve_edited")
         for stage in stages.STAGES[stages.NAMES.index(stages.MASK_STAGE) + 1 :]:
-            if stage.name != "transfer":  # it stands under Deliver
+            if stage.name != "transfer":  # shown under Deliver
                 draw_settings(layout, item, stage, without=("skin_tone", "white_point", "together"))
 
 
-def tone_words(item, known: status.Status | None) -> str:
-    """Where the skin tone comes from and how sure it is."""
+def tone_words(item, capture_status: status.Status | None) -> str:
+    """Describe the source of the skin tone and its uncertainty."""
     if not item.use_skin_tone:
-        findings = [
-            finding
-            for finding in (known.findings if known else ())
-            if finding["stage"] == "solve" and not finding["stopped"]
-        ]
-        return (
-            " ".join(iface_(findings[-1][part]) for part in ("problem", "remedy"))
-            if findings
-            else iface_("Estimated from the frames when the maps are solved")
-        )
+        findings = capture_status.findings if capture_status else ()
+        findings = [finding for finding in findings if finding["stage"] == "solve" and not finding["stopped"]]
+        if findings:
+            return " ".join(iface_(findings[-1][part]) for part in ("problem", "remedy"))
+        return iface_("Estimated from the frames when the maps are solved")
     if max(abs(a - b) for a, b in zip(item.skin_tone, item.estimated_tone, strict=True)) > 1e-4:
         return iface_("Chosen by you: this wins")
     if item.tone_source != "white point":
@@ -81,11 +76,13 @@ def tone_words(item, known: status.Status | None) -> str:
 
 
 def _draw_white_point(layout, item) -> None:
-    measured = item.solve.white_point != "auto"
+    is_measured = item.solve.white_point != "auto"
     row = layout.row(align=True)
-    words = ", ".join(band[:4] for band in item.solve.white_point.split(",")) if measured else iface_("from the scene")
+    words = iface_("from the scene")
+    if is_measured:
+        words = ", ".join(band[:4] for band in item.solve.white_point.split(","))
     row.label(text=iface_("White Point: {}").format(words))
-    if measured:
+    if is_measured:
         row.operator("wildcap.clear_white_point", text="", icon='X')
     layout.operator("wildcap.find_color_checker")
     row = layout.row(align=True)

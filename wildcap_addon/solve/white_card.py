@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: the white point, from a ColorChecker that the solver's Python finds in the frames, or from a click on a
-grey card or white paper in one."""
+"""Operators that measure the white point: from a ColorChecker in the frames, a grey card or white paper."""
 
 import bpy
 import numpy as np
@@ -9,17 +8,16 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.capture.messages import Problem
 from ...core.settings.settings import CARDS
-from .. import captures, jobs, undo
+from .. import captures, colours, jobs, undo
 from ..base_operator import CaptureOperator, JobOperator
 from .eyedropper import colour_at
 
 BURNT_SRGB, BLACK_SRGB = 0.97, 0.04
-"""sRGB beyond which a channel has lost its value"""
+"""sRGB values beyond which a channel is clipped."""
 
 
 class WILDCAP_OT_find_color_checker(JobOperator, bpy.types.Operator):
-    """Look for a ColorChecker in the frames and take the white point from its greys; the colour of the light then no
-    longer has to be guessed"""
+    """Find a ColorChecker in the frames, and measure the white point on its greys instead of estimating it."""
 
     bl_idname = "wildcap.find_color_checker"
     bl_label = "Find ColorChecker"
@@ -35,8 +33,10 @@ class WILDCAP_OT_find_color_checker(JobOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
-    """Shows a frame: click on a grey card or white paper that is in the face's light. Mouse wheel or arrow keys go to
-    other frames, Esc leaves it"""
+    """Show a frame: click on a grey card or white paper that is in the face's light.
+
+    Mouse wheel or arrow keys show other frames, Esc cancels.
+    """
 
     bl_idname = "wildcap.pick_white_point"
     bl_label = "Pick White Point"
@@ -46,10 +46,10 @@ class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
         name="Card", items=[('grey', "Grey Card", "Of 18 percent"), ('white', "White Paper", "Plain paper, not glossy")]
     )
     frame: bpy.props.StringProperty(name="Frame", description="Name of the frame's file")
-    uv: bpy.props.FloatVectorProperty(name="UV", size=2, description="Where on the frame to look; a click says it")
+    uv: bpy.props.FloatVectorProperty(name="UV", size=2, description="Place on the frame, set by a click")
 
     def invoke(self, context, event):
-        self._frames = frame_names(captures.folder(captures.require(context)))
+        self._frames = sorted(path.name for path in captures.folder(captures.require(context)).frames.glob("*.jpg"))
         if not self._frames or context.area is None or context.area.type != 'VIEW_3D':
             return self.execute(context)
         self._at, self._area, self._shown = len(self._frames) // 2, context.area, None
@@ -94,21 +94,17 @@ class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
                 "The card is burnt out or black there.",
                 "Choose another frame or place, or a grey card instead of white paper.",
             )
-        linear = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4) / CARDS[self.card]
-        set_white(captures.root(item), linear.tolist())
+        set_white(captures.root(item), (colours.srgb_to_linear(colour) / CARDS[self.card]).tolist())
 
     def _show(self, context):
-        """Puts the frame into the editor in place of the one before."""
+        """Show the current frame in the editor."""
         frame = captures.folder(captures.require(context)).frames / self._frames[self._at]
         before, self._shown = self._shown, bpy.data.images.load(str(frame))
         self._area.spaces.active.image = self._shown
         if before is not None:
             bpy.data.images.remove(before)
-        self._area.header_text_set(
-            iface_("Frame {}: click on the card, wheel or arrows for other frames, Esc to leave").format(
-                self._frames[self._at]
-            )
-        )
+        text = iface_("Frame {}: click on the card, wheel or arrows for other frames, Esc to leave")
+        self._area.header_text_set(text.format(self._frames[self._at]))
 
     def _leave(self, context):
         context.window.cursor_modal_restore()
@@ -118,7 +114,7 @@ class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_clear_white_point(CaptureOperator, bpy.types.Operator):
-    """Forget the measured white point: it is estimated from the scene again"""
+    """Forget the measured white point: it is estimated from the scene again."""
 
     bl_idname = "wildcap.clear_white_point"
     bl_label = "Clear White Point"
@@ -128,16 +124,10 @@ class WILDCAP_OT_clear_white_point(CaptureOperator, bpy.types.Operator):
         captures.require(context).solve.white_point = "auto"
 
 
-def frame_names(capture) -> list[str]:
-    """File names of a capture's frames, in order."""
-    return sorted(path.name for path in capture.frames.glob("*.jpg"))
-
-
 def set_white(root: str, linear: list[float]) -> None:
-    """The measured white point into the settings of the capture, in whichever scene lists it."""
-    for item in captures.listed():
-        if captures.root(item) == root:
-            item.solve.white_point = ",".join(f"{v:.4f}" for v in linear)
+    """Store the measured white point in the capture's settings, in all scenes."""
+    for item in captures.of_root(root):
+        item.solve.white_point = ",".join(f"{v:.4f}" for v in linear)
 
 
 CLASSES = (WILDCAP_OT_find_color_checker, WILDCAP_OT_pick_white_point, WILDCAP_OT_clear_white_point)

@@ -1,19 +1,19 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head that is excluded from the view layer or renamed while its mask is painted: the painting ends with the mask
-saved and the head as it was."""
+"""A head that is excluded from the view layer, renamed or deleted while its mask is painted: the painting ends with the
+mask saved and the head as it was."""
 
 import numpy as np
 import pytest
+
+from tests.fixtures.refused import refuses
 
 bpy = pytest.importorskip("bpy")
 
 
 @pytest.fixture
-def excluded(addon, capture):
-    """The head in a collection; calling it takes that out of the view layer, or puts it back."""
-    bpy.ops.wildcap.bring_in_head()
-    head = bpy.context.view_layer.objects.active
+def exclude(head):
+    """Function that takes the collection of the head out of the view layer, or puts it back."""
     faces = bpy.data.collections.new("Faces")
     bpy.context.scene.collection.children.link(faces)
     faces.objects.link(head)
@@ -27,52 +27,56 @@ def excluded(addon, capture):
     return exclude
 
 
-def test_a_head_whose_collection_is_excluded_is_told_to_be_shown(excluded, capture):
-    excluded(True)
+def test_a_head_whose_collection_is_excluded_is_told_to_be_shown(exclude):
+    exclude(True)
     meshes = len(bpy.data.meshes)
     for button in (bpy.ops.wildcap.bring_in_head, bpy.ops.wildcap.paint_mask):
-        with pytest.raises(RuntimeError, match="excluded from this view layer"):
-            button()
+        refuses("excluded from this view layer", button)
     assert len(bpy.data.meshes) == meshes and bpy.context.mode == 'OBJECT'
 
 
-def test_a_head_that_is_excluded_while_it_is_painted_ends_the_painting_with_its_mask_saved(excluded, addon, capture):
-    session = addon("paint.session")
+def test_a_head_that_is_excluded_while_it_is_painted_ends_the_painting_with_its_mask_saved(exclude, session, capture):
     bpy.ops.wildcap.paint_mask()
     image = session.mask()
     image.pixels.foreach_set(np.ones(len(image.pixels), np.float32))
-    excluded(True)
+    exclude(True)
     session.end_painting(bpy.context)
     assert not session.active() and (capture / "shadow_mask.png").is_file()
-    excluded(False)
+    exclude(False)
     assert bpy.ops.wildcap.paint_mask() == bpy.ops.wildcap.finish_mask() == {'FINISHED'}
 
 
-def test_the_watch_goes_on_whatever_ending_raises(excluded, addon, capture, monkeypatch):
-    session, problems = addon("paint.session"), addon("problems")
+def test_a_painting_whose_head_was_deleted_still_ends_and_keeps_its_mask(session, capture, head, paint_spot):
+    bpy.ops.wildcap.paint_mask()
+    painted = paint_spot(10)
+    bpy.ops.object.mode_set(mode='OBJECT')
+    bpy.data.objects.remove(head)
+    bpy.ops.wildcap.finish_mask()
+    assert not session.active() and (capture / "shadow_mask.png").read_bytes() == painted
+    assert "WildCap Mask" not in bpy.data.brushes and not bpy.context.scene.tool_settings.image_paint.use_stencil_layer
+
+
+def test_the_watch_goes_on_whatever_ending_raises(addon, session, capture, head, monkeypatch):
     if not bpy.context.window_manager.windows:
         pytest.skip("no window in this Blender: the flows in a window hold it")
-    bpy.ops.wildcap.paint_mask()
-    bpy.ops.object.mode_set(mode='OBJECT')
 
     def fail(context):
         raise RuntimeError("not in the view layer")
 
+    bpy.ops.wildcap.paint_mask()
+    bpy.ops.object.mode_set(mode='OBJECT')
     with monkeypatch.context() as patched:
         patched.setattr(session, "end_painting", fail)
         assert session._watch() == 4 * session.WATCH_S
-    assert "not in the view layer" in problems.of(str(capture)).problem
+    assert "not in the view layer" in addon("problems").of(str(capture)).problem
     session._watch()
     assert not session.active()
 
 
-def test_a_head_that_was_renamed_while_it_was_painted_is_let_go_as_it_was(addon, capture):
-    bpy.ops.wildcap.bring_in_head()
-    head = bpy.context.view_layer.objects.active
-    head.shape_key_add(name="Basis")
-    head.shape_key_add(name="Smile")
-    head.active_shape_key_index = 1
-    head.data.use_mirror_x = True
+def test_a_head_that_was_renamed_while_it_was_painted_is_let_go_as_it_was(head):
+    for name in ("Basis", "Smile"):
+        head.shape_key_add(name=name)
+    head.active_shape_key_index, head.data.use_mirror_x = 1, True
     bpy.ops.wildcap.paint_mask()
     assert head.show_only_shape_key
     head.name = "Hero"

@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the head was made from, in Blender's scene: cameras that see what the frames saw, and the scan."""
 
+import struct
+
 import pytest
 
 from tests.fixtures import standin
+from tests.fixtures.refused import refuses
 from tests.fixtures.standin import CENTRE, FOCAL, HEIGHT, WIDTH
 
 bpy = pytest.importorskip("bpy")
@@ -59,17 +62,15 @@ def test_cameras_and_scan_come_in_again_in_place_and_go_with_the_head(addon, rec
     filmed = sorted(name.split()[-1] for name in cameras())
     assert filmed == ["00000.jpg", "00002.jpg"], "those the texture is made from"
     assert len(bpy.data.cameras) == 2 and [c.name for c in bpy.data.collections] == ["head Cameras"]
-    scans = [o for o in bpy.context.scene.objects if o.name.endswith("Scan")]
-    assert (
-        len(scans) == 1 and len(scans[0].data.vertices) == 4 and scans[0].data.vertices[0].co.y == pytest.approx(-0.1)
-    )
-    assert bpy.context.view_layer.objects.active == head and head.select_get() and not scans[0].select_get()
-    before = {o.name: o.matrix_world.copy() for o in (*cameras().values(), scans[0])}
+    (scan,) = (o for o in bpy.context.scene.objects if o.name.endswith("Scan"))
+    assert len(scan.data.vertices) == 4 and scan.data.vertices[0].co.y == pytest.approx(-0.1)
+    assert bpy.context.view_layer.objects.active == head and head.select_get() and not scan.select_get()
+    before = {thing: thing.matrix_world.copy() for thing in (*cameras().values(), scan)}
     head.matrix_world = Matrix.Translation((1, 2, 3))
     bpy.context.view_layer.update()
-    for name, matrix in before.items():
-        moved = bpy.data.objects[name].matrix_world.translation - matrix.translation
-        assert tuple(moved) == pytest.approx((1, 2, 3), abs=1e-5), name
+    for thing, matrix in before.items():
+        moved = thing.matrix_world.translation - matrix.translation
+        assert tuple(moved) == pytest.approx((1, 2, 3), abs=1e-5), thing.name
     assert addon("captures").active(bpy.context).path == str(reconstructed)
 
 
@@ -118,46 +119,37 @@ def test_the_scan_comes_in_again_while_the_old_one_is_active(reconstructed):
     assert bpy.context.view_layer.objects.active.name.endswith("Scan")
 
 
-def test_what_is_missing_or_damaged_is_told_and_nothing_comes_in_while_painting(addon, reconstructed):
+def test_nothing_comes_in_while_painting_or_from_damaged_cameras(reconstructed):
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.paint_mask()
     assert not bpy.ops.wildcap.bring_in_cameras.poll() and not bpy.ops.wildcap.bring_in_scan.poll()
     bpy.ops.wildcap.finish_mask()
     (reconstructed / "cameras" / "images.bin").write_bytes(b"\3\0\0\0\0\0\0\0short")
-    with pytest.raises(RuntimeError, match="cannot be read"):
-        bpy.ops.wildcap.bring_in_cameras()
+    refuses("cannot be read", bpy.ops.wildcap.bring_in_cameras)
     (reconstructed / "cameras" / "images.bin").unlink()
-    with pytest.raises(RuntimeError, match="no cameras yet"):
-        bpy.ops.wildcap.bring_in_cameras()
-    (reconstructed / "scan.ply").unlink()
-    with pytest.raises(RuntimeError, match="no scan yet"):
-        bpy.ops.wildcap.bring_in_scan()
+    refuses("no cameras yet", bpy.ops.wildcap.bring_in_cameras)
     assert not cameras()
 
 
-def test_landmarks_that_were_moved_on_one_head_stay_when_another_ones_are_shown(addon, reconstructed, tmp_path):
-    shown = addon("reconstruct.landmarks").shown_landmarks
-    roots = [reconstructed, standin.make(tmp_path / "other.wildcap")]
-    for root in roots:
-        (root / "landmarks.json").write_text('{"points": {"1": [0, -0.1, 0], "152": [0, -0.1, -0.1]}}', "ascii")
-    heads = []
-    for root in roots:
-        bpy.ops.wildcap.open_capture(directory=str(root))
-        bpy.ops.wildcap.bring_in_head()
-        heads.append(bpy.context.view_layer.objects.active)
-    first, second = bpy.context.scene.wildcap.captures
-    bpy.context.view_layer.objects.active = heads[0]
-    bpy.ops.wildcap.show_landmarks()
-    bpy.data.collections["WildCap Landmarks"].name = "Mine"
-    shown(first)[0].location.x += 0.01
-    bpy.context.view_layer.objects.active = heads[1]
-    assert not bpy.ops.wildcap.hide_landmarks.poll() and not shown(second)
-    for _ in range(2):
-        bpy.ops.wildcap.show_landmarks()
-        assert len(shown(first)) == len(shown(second)) == 2
-    assert shown(first)[0].location.x == pytest.approx(0.01)
-    bpy.ops.wildcap.hide_landmarks()
-    assert len(shown(first)) == 2 and not shown(second)
-    bpy.context.view_layer.objects.active = heads[0]
-    bpy.ops.wildcap.hide_landmarks()
-    assert not shown(first)
+def write_cameras(folder, name: bytes = b"00000.jpg", focal: float = 900.0, width: int = 720, count: int = 1) -> None:
+    camera = struct.pack("<iiQQ3d", 1, 0, width, 960, focal, 360, 480)
+    (folder / "cameras.bin").write_bytes(struct.pack("<Q", count) + camera)
+    pose = struct.pack("<Qi7dI", count, 1, 1, 0, 0, 0, 0, 0, 1, 1)
+    (folder / "images.bin").write_bytes(pose + name + b"\0" + struct.pack("<Q", 0))
+
+
+def test_cameras_that_are_damaged_or_a_stranger_s_are_refused(addon, tmp_path):
+    read = addon("reconstruct.colmap_cameras").read
+    write_cameras(tmp_path)
+    assert [camera.name for camera in read(tmp_path)] == ["00000.jpg"]
+    for spoiled in (
+        {"name": b"../../private/x.jpg"},
+        {"focal": float("nan")},
+        {"focal": 0.0},
+        {"width": 2**40},
+        {"width": 0},
+        {"count": 2**60},
+        {"name": b"\xff.jpg"},
+    ):
+        write_cameras(tmp_path, **spoiled)
+        refuses("cannot be read", read, tmp_path)

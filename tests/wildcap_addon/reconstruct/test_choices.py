@@ -9,13 +9,9 @@ import pytest
 
 from core.capture.capture import Capture
 from tests.fixtures import standin
+from tests.fixtures.refused import refuses
 
 bpy = pytest.importorskip("bpy")
-
-
-@pytest.fixture
-def item(addon, capture):
-    return addon("captures").active(bpy.context)
 
 
 def obj_rows(path, kind: str) -> list[list[float]]:
@@ -26,8 +22,7 @@ def obj_rows(path, kind: str) -> list[list[float]]:
 def test_the_active_mesh_is_kept_as_it_is_with_its_uvs_and_without_modifiers(addon, capture, item):
     bpy.ops.wildcap.bring_in_head()
     head = bpy.context.view_layer.objects.active
-    with pytest.raises(RuntimeError, match="own head or scan"):
-        bpy.ops.wildcap.use_active_mesh()
+    refuses("own head or scan", bpy.ops.wildcap.use_active_mesh)
     bpy.ops.mesh.primitive_uv_sphere_add(segments=12, ring_count=8, location=(0, 0, 1))
     mine = bpy.context.view_layer.objects.active
     mine.name = "Mein Kopf é"
@@ -38,54 +33,45 @@ def test_the_active_mesh_is_kept_as_it_is_with_its_uvs_and_without_modifiers(add
     bpy.ops.wildcap.use_active_mesh()
     path = Path(item.registration.template)
     assert path.parent == capture / "template" and path.suffix == ".obj"
-    found = obj_rows(path, "v")
-    assert len(found) == len(expected)
-    assert all(row[:3] == pytest.approx(place, abs=1e-5) for row, place in zip(found, expected, strict=True))
-    assert len(obj_rows(path, "vt")) > 0
+    rows = [tuple(row[:3]) for row in obj_rows(path, "v")]
+    assert len(rows) == len(expected) and len(obj_rows(path, "vt")) > 0
+    assert all(row == pytest.approx(place, abs=1e-5) for row, place in zip(rows, expected, strict=True))
     assert head.select_get() and mine.select_get() and bpy.context.view_layer.objects.active == mine
     assert addon("properties").job_settings(item)["registration"]["template"] == str(path)
     bpy.ops.wildcap.use_built_in_head()
     assert item.registration.template == "" and not bpy.ops.wildcap.use_built_in_head.poll()
 
 
-def test_a_template_is_an_obj_or_a_folder_with_a_neutral_one(addon, item, tmp_path):
-    folder = tmp_path / "FaceKit"
+def test_a_template_is_an_obj_or_a_folder_with_a_neutral_one(item, tmp_path):
+    folder, notes = tmp_path / "FaceKit", tmp_path / "notes.txt"
     folder.mkdir()
-    with pytest.raises(RuntimeError, match="no OBJ with 'neutral'"):
-        bpy.ops.wildcap.choose_template(filepath=str(folder))
+    notes.touch()
+    choose = bpy.ops.wildcap.choose_template
+    refuses("no OBJ with 'neutral'", choose, filepath=str(folder))
     (folder / "generic_neutral_mesh.obj").write_text(standin.egg(), encoding="ascii")
-    bpy.ops.wildcap.choose_template(filepath=str(folder))
-    assert item.registration.template == str(folder)
-    bpy.ops.wildcap.choose_template(filepath=str(folder / "generic_neutral_mesh.obj"))
-    assert item.registration.template == str(folder / "generic_neutral_mesh.obj")
-    (tmp_path / "notes.txt").write_text("no head", encoding="ascii")
-    for wrong in ("notes.txt", "nothing.obj"):
-        with pytest.raises(RuntimeError, match="neither an OBJ nor a folder"):
-            bpy.ops.wildcap.choose_template(filepath=str(tmp_path / wrong))
+    for path in (folder, folder / "generic_neutral_mesh.obj"):
+        choose(filepath=str(path))
+        assert item.registration.template == str(path)
+    for path in (notes, tmp_path / "nothing.obj"):
+        refuses("neither an OBJ nor a folder", choose, filepath=str(path))
 
 
 def test_the_wipe_shows_a_frame_before_and_after_and_leaves_no_image_behind(addon, capture, item):
-    delighters = addon("reconstruct.delighters")
-    with pytest.raises(RuntimeError, match="No frame has been delit"):
-        bpy.ops.wildcap.compare_delit()
-    for folder in ("frames", "delit"):
-        (capture / folder).mkdir()
+    delighters, manager = addon("reconstruct.delighters"), bpy.context.window_manager
     for name, before, after in (("00003", (200, 100, 50), (100, 50, 25)), ("00009", (20, 20, 20), (40, 40, 40))):
-        (capture / "frames" / f"{name}.png").write_bytes(standin.png([[before] * 40] * 80))
-        (capture / "delit" / f"{name}.png").write_bytes(standin.png([[after] * 40] * 80))
-    manager, side = bpy.context.window_manager, delighters.SIDE_PX
+        for folder, colour in (("frames", before), ("delit", after)):
+            (capture / folder).mkdir(exist_ok=True)
+            (capture / folder / f"{name}.png").write_bytes(standin.png([[colour] * 40] * 80))
 
-    def at(x: float):
-        picture = delighters._icons["wipe"]
-        pixels = list(picture.image_pixels_float)
+    def at(x: float) -> list[int]:
+        pixels, side = list(delighters._icons["wipe"].image_pixels_float), delighters.SIDE_PX
         start = 4 * (side // 2 * side + math.floor(x * side))
         return [round(255 * value) for value in pixels[start : start + 4]]
 
     manager.wildcap_wipe = 0.5
-    images = len(bpy.data.images)
+    images, folder = len(bpy.data.images), addon("captures").folder(item)
     bpy.ops.wildcap.compare_delit(which=0)
-    capture_of = addon("captures").folder(item)
-    assert delighters.shown_frame(capture_of) == "00003" and len(bpy.data.images) == images
+    assert delighters.shown_frame(folder) == "00003" and len(bpy.data.images) == images
     assert at(0.3) == [200, 100, 50, 255] and at(0.7) == [100, 50, 25, 255]
     assert at(0.5)[:3] == [255, 255, 255] and at(0.1)[3] == 0
     manager.wildcap_wipe = 0.8
@@ -93,10 +79,9 @@ def test_the_wipe_shows_a_frame_before_and_after_and_leaves_no_image_behind(addo
     manager.wildcap_wipe = 0.0
     assert at(0.3) == [100, 50, 25, 255]
     bpy.ops.wildcap.compare_delit()
-    assert delighters.shown_frame(capture_of) == "00009" and at(0.5) == [40, 40, 40, 255]
+    assert delighters.shown_frame(folder) == "00009" and at(0.5) == [40, 40, 40, 255]
     bpy.ops.wildcap.compare_delit()
-    assert delighters.shown_frame(capture_of) == "00003", "round and round"
-    assert len({delighters.icon() for _ in range(2)}) == 1
+    assert delighters.shown_frame(folder) == "00003", "round and round"
     delighters.forget()
 
 
@@ -104,35 +89,30 @@ def test_sixteen_bits_are_read_as_the_eye_sees_them(addon, tmp_path):
     """What the worker writes has 16 bits, which Blender would take for linear light."""
     image = bpy.data.images.new("deep", 8, 8, float_buffer=True, is_data=True)
     image.pixels.foreach_set([0.25, 0.5, 0.75, 1.0] * 64)
-    image.filepath_raw, image.file_format = str(tmp_path / "deep.png"), 'PNG'
     settings = bpy.context.scene.render.image_settings
     settings.file_format, settings.color_depth, settings.color_mode = 'PNG', '16', 'RGB'
     bpy.context.scene.view_settings.view_transform = 'Raw'
     image.save_render(str(tmp_path / "deep.png"))
     bpy.data.images.remove(image)
-    read = addon("reconstruct.delighters")._read(tmp_path / "deep.png")
-    assert read[128, 128, :3] == pytest.approx((0.25, 0.5, 0.75), abs=0.01)
+    pixels = addon("reconstruct.delighters")._read(tmp_path / "deep.png")
+    assert pixels[128, 128, :3] == pytest.approx((0.25, 0.5, 0.75), abs=0.01)
 
 
 def test_the_chain_can_begin_at_any_stage(addon, capture, item, monkeypatch):
     started = []
-
-    def start(item, goal, **span):
-        started.append((goal, span["first"], span["last"]))
-
-    monkeypatch.setattr(addon("jobs"), "start", start)
-    bpy.ops.wildcap.reconstruct(first="upscale")
-    bpy.ops.wildcap.reconstruct(first="transfer")
-    bpy.ops.wildcap.reconstruct(to_end=True)
-    with pytest.raises(RuntimeError, match="no video"):
-        bpy.ops.wildcap.reconstruct(first="delight")
-    with pytest.raises(RuntimeError, match="no stage named"):
-        bpy.ops.wildcap.reconstruct(first="dreams")
+    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, *, first, last: started.append((goal, first, last)))
+    reconstruct = bpy.ops.wildcap.reconstruct
+    for span in ({"first": "upscale"}, {"first": "transfer"}, {"to_end": True}):
+        reconstruct(**span)
+    refuses("no video", reconstruct, first="delight")
+    refuses("no stage named", reconstruct, first="dreams")
     Capture(capture).set_source(capture.parent / "face.mp4")
-    bpy.ops.wildcap.reconstruct(first="delight")
+    for span in ({"first": "delight"}, {}):
+        reconstruct(**span)
     assert started == [
         ("solve", "upscale", None),
         ("solve", "transfer", None),
         ("solve", None, None),
         ("reconstruct", "delight", "shadow_mask"),
+        ("reconstruct", None, "shadow_mask"),
     ]
