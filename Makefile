@@ -26,7 +26,7 @@ PROCESSES = --numprocesses auto --maxprocesses 4 --dist loadfile
 .PHONY: demo test test-research test-failed results test-blenders test-gui test-gui-newest zip site clean
 
 demo: $(VENV)/installed
-	$(BIN)/python -m research.benchmarks.demo $(DEMO)
+	$(BIN)/python -m research.benchmarks.captures.demo $(DEMO)
 
 test: $(VENV)/installed
 	$(BIN)/ruff check .

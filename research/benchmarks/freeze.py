@@ -10,7 +10,7 @@ on the old delighter's textures.
 Kept are the frames, cameras, head, delit frames, textures and masks, and the solved maps for comparison;
 OUT/frozen.json has each file's hash, and of each stage the version and the code's key. OUT lies outside of the
 repository. What was kept is never replaced: a capture that has changed since is named, and ends the run with code 1.
-Solve a copy of it; research/benchmarks/state.py measures OUT as it is, with --truths FOLDER.
+Solve a copy of it; research/benchmarks/delighting/state.py measures OUT as it is, with --truths FOLDER.
 """
 
 from __future__ import annotations

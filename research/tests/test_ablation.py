@@ -7,8 +7,8 @@ import pytest
 
 from core.face import template
 from core.imaging import images
-from research.benchmarks import ablation, uv_problems
-from research.benchmarks.ablation_measures import measure_regions, summary, table
+from research.benchmarks.maps import ablation, uv_problems
+from research.benchmarks.maps.ablation_measures import measure_regions, summary, table
 from research.people.light import SkyAndSun, bake
 
 

@@ -4,7 +4,8 @@
 
 import pytest
 
-from research.benchmarks import figures, shadow_mask, skin_tone
+from research.benchmarks import figures
+from research.benchmarks.delighting import shadow_mask, skin_tone
 
 
 def test_tones_are_summed_up_by_group():

@@ -12,7 +12,7 @@ from research.people.blender_module import without_numpy_1
 from tests.conftest import ROOT
 
 ENABLED = """import os
-from research.benchmarks.render_capture import extension
+from research.benchmarks.pictures.render_capture import extension
 with extension():
     import bpy
     print("in", bpy.app.version_string, flush=True)

@@ -15,7 +15,10 @@ from core.face.head import Head  # noqa: E402
 from core.geometry import meshes, raster
 from core.geometry.views import read_views  # noqa: E402
 from core.imaging import images  # noqa: E402
-from research.benchmarks import controlled, flash_light  # noqa: E402
+from research.benchmarks.light import (
+    controlled,
+    flash_light,  # noqa: E402
+)
 from tests.fixtures import photographed_head  # noqa: E402
 from tests.fixtures.egg import egg  # noqa: E402
 

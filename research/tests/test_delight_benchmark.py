@@ -15,9 +15,11 @@ from core.capture.messages import Problem  # noqa: E402
 from core.face import template  # noqa: E402
 from core.imaging import images  # noqa: E402
 from core.settings.settings import Settings  # noqa: E402
-from research.benchmarks import delight, delight_portraits  # noqa: E402
-from research.benchmarks.albedo_score import AlbedoTruth  # noqa: E402
-from research.benchmarks.delight_measures import (
+from research.benchmarks.delighting import (
+    delight,
+    delight_portraits,  # noqa: E402
+)
+from research.benchmarks.delighting.delight_measures import (
     FIGURES,
     flat_tone,
     mean_of,
@@ -26,7 +28,8 @@ from research.benchmarks.delight_measures import (
     table,
     tone_group,
 )
-from research.benchmarks.delight_sets import Photograph, Photographs, light_stage  # noqa: E402
+from research.benchmarks.delighting.delight_sets import Photograph, Photographs, light_stage  # noqa: E402
+from research.benchmarks.maps.albedo_score import AlbedoTruth  # noqa: E402
 from research.benchmarks.measures import pictures  # noqa: E402
 from research.people.parameters import sample_parameters  # noqa: E402
 from research.people.skin import make_skin  # noqa: E402

@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tables of research.benchmarks.geometry: what was measured stands in them, what was not is said."""
+"""The tables of research.benchmarks.head.geometry: what was measured stands in them, what was not is said."""
 
-from research.benchmarks import figures, geometry_table
+from research.benchmarks import figures
+from research.benchmarks.head import geometry_table
 
 RESULTS = {
     "sample": {
@@ -67,7 +68,7 @@ def test_what_is_published_makes_the_same_tables(tmp_path):
     figures.write_record(
         tmp_path / "geometry.json",
         "geometry",
-        "python -m research.benchmarks.geometry FOLDER",
+        "python -m research.benchmarks.head.geometry FOLDER",
         geometry_table.published(long),
     )
     assert geometry_table.table(figures.read_record("geometry", tmp_path)["figures"]) == geometry_table.table(long)

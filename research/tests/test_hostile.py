@@ -16,9 +16,9 @@ pytest.importorskip("pycolmap")
 if not sys.platform.startswith("linux"):
     pytest.skip("the limits of memory are Linux's", allow_module_level=True)
 
-from research.benchmarks import hostile_run  # noqa: E402
-from research.benchmarks.hostile_cases import Case  # noqa: E402
-from research.benchmarks.hostile_run import Ended  # noqa: E402
+from research.benchmarks.hostile import run as hostile_run  # noqa: E402
+from research.benchmarks.hostile.cases import Case  # noqa: E402
+from research.benchmarks.hostile.run import Ended  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
 

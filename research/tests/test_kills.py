@@ -32,8 +32,8 @@ from core.geometry.models import read_model, write_model  # noqa: E402
 from core.solver.lighting import Lights  # noqa: E402
 from core.solver.objective import State  # noqa: E402
 from core.stages.solve import checkpoint  # noqa: E402
-from research.benchmarks import kills_judge, kills_worker  # noqa: E402
-from research.benchmarks.kills_capture import BESIDE, STRANGERS, Undisturbed, capture_at  # noqa: E402
+from research.benchmarks.kills import judge, worker  # noqa: E402
+from research.benchmarks.kills.capture import BESIDE, STRANGERS, Undisturbed, capture_at  # noqa: E402
 from tests.fixtures.recorded import make_entry  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -78,7 +78,7 @@ def test_the_judge_is_content_with_what_is_whole_and_finds_every_fault(place):
     undisturbed = Undisturbed(place.parent, {}, ("frames",), known=known)
     place.rename(place.parent / "end")
     undisturbed.copy(place.parent / "end", place)
-    assert kills_judge.judge_kill(place, known) == [] and kills_judge.judge_resume(place, undisturbed, "frames") == []
+    assert judge.judge_kill(place, known) == [] and judge.judge_resume(place, undisturbed, "frames") == []
     for name, content, fault in (
         ("frames/00000.jpg", b"a fra", "no complete content"),
         ("frames/00001.jpg", b"", "no complete content"),
@@ -92,12 +92,12 @@ def test_the_judge_is_content_with_what_is_whole_and_finds_every_fault(place):
         before = (root / name).read_bytes() if (root / name).exists() else None
         (root / name).parent.mkdir(exist_ok=True)
         (root / name).write_bytes(content)
-        assert [told for told in kills_judge.judge_kill(place, known) if fault in told], name
+        assert [told for told in judge.judge_kill(place, known) if fault in told], name
         (root / name).unlink() if before is None else (root / name).write_bytes(before)
-    told = kills_judge.judge_kill(place, known, {"shadow_mask.png": (b"old", b"new")})
+    told = judge.judge_kill(place, known, {"shadow_mask.png": (b"old", b"new")})
     assert told == ["shadow_mask.png is neither the old mask nor a new one"]
     (root / "notes" / "list.txt").rename(root / "list.txt")
-    assert "the user's notes/list.txt is gone" in kills_judge.judge_kill(place, known)
+    assert "the user's notes/list.txt is gone" in judge.judge_kill(place, known)
     (root / "list.txt").rename(root / "notes" / "list.txt")
 
 
@@ -117,17 +117,17 @@ def test_the_judge_finds_what_is_left_after_the_run_that_goes_on(place):
         path = capture_at(place).root / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(b"")
-        assert [told for told in kills_judge.judge_resume(place, undisturbed, "frames") if fault in told], name
+        assert [told for told in judge.judge_resume(place, undisturbed, "frames") if fault in told], name
         shutil.rmtree(place)
     undisturbed.copy(place.parent / "end", place)
     (capture_at(place).frames / "00000.jpg").write_bytes(b"another")
-    assert "frames/00000.jpg is not as in the undisturbed run" in kills_judge.judge_resume(place, undisturbed, "frames")
-    assert "the stage cameras is not on record" in kills_judge.judge_resume(place, undisturbed, "cameras")
+    assert "frames/00000.jpg is not as in the undisturbed run" in judge.judge_resume(place, undisturbed, "frames")
+    assert "the stage cameras is not on record" in judge.judge_resume(place, undisturbed, "cameras")
 
 
 @pytest.mark.parametrize(
     "moment",
-    [kills_worker.Moment(after_s=0.3), kills_worker.Moment(write=3), kills_worker.Moment(write=3, late_s=0.05)],
+    [worker.Moment(after_s=0.3), worker.Moment(write=3), worker.Moment(write=3, late_s=0.05)],
     ids=str,
 )
 def test_a_process_is_struck_at_its_moment(tmp_path, moment):
@@ -136,19 +136,17 @@ def test_a_process_is_struck_at_its_moment(tmp_path, moment):
             (tmp_path / f"{number}.txt").write_text("x")
             time.sleep(0.02)
 
-    forked = kills_worker.Forked(work, tmp_path, tmp_path / "told", moment)
+    forked = worker.Forked(work, tmp_path, tmp_path / "told", moment)
     assert forked.strike() and forked.code == -signal.SIGKILL
     written = len(list(tmp_path.glob("*.txt")))
     assert written == 2 if moment.write and not moment.late_s else 2 < written < 100
-    never = kills_worker.Forked(lambda: None, tmp_path, tmp_path / "told", kills_worker.Moment(write=1))
+    never = worker.Forked(lambda: None, tmp_path, tmp_path / "told", worker.Moment(write=1))
     assert never.strike() is False
 
 
 def test_a_process_may_be_struck_as_soon_as_it_is_there(tmp_path):
     for _ in range(20):
-        forked = kills_worker.Forked(
-            lambda: time.sleep(60), tmp_path, tmp_path / "told", kills_worker.Moment(after_s=0.0)
-        )
+        forked = worker.Forked(lambda: time.sleep(60), tmp_path, tmp_path / "told", worker.Moment(after_s=0.0))
         assert forked.strike() and forked.code == -signal.SIGKILL
 
 
@@ -206,4 +204,4 @@ def with_limit(most_bytes: int, attempt) -> str:
             return problem.problem
         return ""
 
-    return kills_worker.in_fork(work)
+    return worker.in_fork(work)

@@ -13,8 +13,8 @@ from core.solver.lighting import Lights, Shader, constant_light
 from core.solver.objective import Observation, State
 from core.solver.recipes import OURS
 from core.solver.start import Start
-from research.benchmarks import comparison_table, light_models, rerender
-from research.benchmarks.albedo_score import AlbedoTruth, HeadInView
+from research.benchmarks.maps import comparison_table, light_models, rerender
+from research.benchmarks.maps.albedo_score import AlbedoTruth, HeadInView
 
 SIZE = 32
 

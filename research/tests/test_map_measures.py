@@ -10,10 +10,10 @@ import pytest
 from core.face import template
 from core.geometry.raster import interpolate
 from core.imaging import images
-from research.benchmarks.detail import moles
+from research.benchmarks.delighting.shadow_mask import scores
+from research.benchmarks.maps.detail import moles
 from research.benchmarks.measures.features_kept import BROWS, contrast_kept, contrasts, joint
 from research.benchmarks.measures.slopes import slope
-from research.benchmarks.shadow_mask import scores
 
 SIZE = 640
 SKIN = np.float32([0.40, 0.26, 0.19])

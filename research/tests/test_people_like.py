@@ -249,7 +249,7 @@ def test_a_seed_is_one_person(someone):
 
 
 def test_training_never_draws_a_person_who_is_filmed():
-    from research.benchmarks import likenesses
+    from research.benchmarks.captures import likenesses
     from research.training.seeds import FIRST_SEED, HELD_OUT_SEED
 
     filmed = {each.seed for each in (*likenesses.LIKENESSES, *likenesses.HELD_BACK)}
@@ -258,7 +258,7 @@ def test_training_never_draws_a_person_who_is_filmed():
 
 
 def test_the_people_are_the_first_who_are_as_their_names_say():
-    from research.benchmarks import likenesses
+    from research.benchmarks.captures import likenesses
 
     rule = {
         "bearded": lambda p: p.openness > 0 and (p.hair, p.beard) == ("cropped", "full"),

@@ -11,12 +11,15 @@ pytest.importorskip("flip_evaluator")
 
 from core.capture.messages import Problem  # noqa: E402
 from core.imaging import images  # noqa: E402
-from research.benchmarks import pairs, photographs  # noqa: E402
+from research.benchmarks.captures.state_captures import landmarks_in_uv  # noqa: E402
+from research.benchmarks.delighting import (
+    pairs,
+    photographs,  # noqa: E402
+)
 from research.benchmarks.measures.features_kept import BROWS  # noqa: E402
 from research.benchmarks.measures.references import BLUR, FLAT, NOTHING, TRUE  # noqa: E402
 from research.benchmarks.measures.slopes import slope  # noqa: E402
 from research.benchmarks.measures.tone import BEST_PSNR  # noqa: E402
-from research.benchmarks.state_captures import landmarks_in_uv  # noqa: E402
 
 SIZE = 256
 

@@ -14,9 +14,11 @@ from core.capture.capture import Capture  # noqa: E402
 from core.face import template
 from core.geometry.meshes import write_obj  # noqa: E402
 from core.imaging import images  # noqa: E402
-from research.benchmarks import gallery, people, people_lights, relit  # noqa: E402
-from research.benchmarks.delight_measures import TONES, tone_group  # noqa: E402
-from research.benchmarks.relit_maps import Worn, make_rows, read_worn, worn_by, write_row  # noqa: E402
+from research.benchmarks.captures import people, people_lights
+from research.benchmarks.delighting.delight_measures import TONES, tone_group  # noqa: E402
+from research.benchmarks.light import relit  # noqa: E402
+from research.benchmarks.light.relit_maps import Worn, make_rows, read_worn, worn_by, write_row  # noqa: E402
+from research.benchmarks.pictures import gallery
 from research.people import pigment  # noqa: E402
 from research.people.identities import reserved_seeds  # noqa: E402
 from research.people.parameters import sample_parameters  # noqa: E402

@@ -5,7 +5,8 @@
 import numpy as np
 import pytest
 
-from research.benchmarks import figures, open_eyes, results
+from research.benchmarks import figures, results
+from research.benchmarks.head import open_eyes
 from research.benchmarks.results import delighters, index
 from tests.conftest import ROOT
 

@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("pycolmap")
 pytest.importorskip("OpenImageIO")
 
-from research.benchmarks import scan_captures  # noqa: E402
+from research.benchmarks.captures import scan_captures  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT.parent / "shared" / "data"
@@ -20,7 +20,7 @@ DATA = ROOT.parent / "shared" / "data"
 
 def test_without_the_scan_it_says_what_is_missing(tmp_path):
     done = subprocess.run(
-        [sys.executable, "-m", "research.benchmarks.scan_captures", str(tmp_path), str(tmp_path / "out")],
+        [sys.executable, "-m", "research.benchmarks.captures.scan_captures", str(tmp_path), str(tmp_path / "out")],
         cwd=ROOT,
         capture_output=True,
         text=True,

@@ -9,8 +9,8 @@ pytest.importorskip("flip_evaluator")
 
 from core.capture.capture import Capture  # noqa: E402
 from core.imaging import images  # noqa: E402
-from research.benchmarks import albedo_score  # noqa: E402
-from research.benchmarks.albedo_score import AlbedoTruth, compare  # noqa: E402
+from research.benchmarks.maps import albedo_score  # noqa: E402
+from research.benchmarks.maps.albedo_score import AlbedoTruth, compare  # noqa: E402
 
 
 @pytest.fixture

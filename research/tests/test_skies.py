@@ -8,7 +8,7 @@ import pytest
 from core.light import sunlight
 from core.light.skylight import fibonacci_sphere
 from core.light.spherical_harmonics import LAMBERT, per_function, sh_basis
-from research.benchmarks.skies import count_independent, harmonic_shares, summarise_skies
+from research.benchmarks.light.skies import count_independent, harmonic_shares, summarise_skies
 from research.people.environments import panorama_directions, without_lamp
 
 DIRECTIONS = panorama_directions(64, 128)

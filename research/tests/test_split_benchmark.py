@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from core.stages.solve.head_cells import place_cells
-from research.benchmarks import figures, split, traits
+from research.benchmarks import figures
+from research.benchmarks.maps import split, traits
 from research.benchmarks.measures.table import summarise, to_record
 from research.training.traits import LargeShapes, deviations_at
 

@@ -15,11 +15,15 @@ from core.capture.capture import Capture  # noqa: E402
 from core.face import template  # noqa: E402
 from core.imaging import images  # noqa: E402
 from core.light.spherical_harmonics import sh_basis  # noqa: E402
-from research.benchmarks import state, state_captures, state_scores  # noqa: E402
-from research.benchmarks.albedo_score import AlbedoTruth, HeadInView  # noqa: E402
+from research.benchmarks.captures import state_captures
+from research.benchmarks.captures.state_captures import DELIT, SIZE, SOLVED  # noqa: E402
+from research.benchmarks.delighting import (
+    state,
+    state_scores,  # noqa: E402
+)
+from research.benchmarks.maps.albedo_score import AlbedoTruth, HeadInView  # noqa: E402
 from research.benchmarks.measures.references import FLAT, NOTHING, TRUE  # noqa: E402
 from research.benchmarks.measures.tone import BEST_PSNR  # noqa: E402
-from research.benchmarks.state_captures import DELIT, SIZE, SOLVED  # noqa: E402
 from tests.fixtures.recorded import make_entry  # noqa: E402
 
 SKIN = np.float32([0.45, 0.28, 0.2])

@@ -25,7 +25,7 @@ SCATTERING_RGB = (1.0, 0.37, 0.19)
 """Mean free paths relative to red's (Jensen et al. 2001, skin1: 3.67, 1.37 and 0.68 mm)."""
 GIVEN_BACK = (0.954, 0.932, 0.928)
 """Share of its Base Color that skin reflects under even light by Cycles's *Random Walk (Skin)*: the mean over six tones
-of `python -m research.benchmarks.even_light`. The other random walk reflects 0.78 to 0.91."""
+of `python -m research.benchmarks.light.even_light`. The other random walk reflects 0.78 to 0.91."""
 TYPICAL_SPECULAR = 0.35
 """Mean of an unmeasured specular map on cheeks and forehead. The map holds levels for an IOR of 1.5, of which 0.35 is
 skin's 2.8 percent."""

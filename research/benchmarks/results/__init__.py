@@ -11,7 +11,7 @@ where a page is not as the records have it.
 
 No picture is made here of what is in the repository alone. teaser.jpg and gallery_NAME.jpg show solved captures:
 --captures names a folder with sample.wildcap (as `make demo` leaves it) and NAME.wildcap
-(research/benchmarks/people.py). Others are made by their page's benchmark (--picture, --pictures)."""
+(research/benchmarks/captures/people.py). Others are made by their page's benchmark (--picture, --pictures)."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def pictures(captures: Path) -> Iterator[list[str]]:
     for capture in sorted(path for path in captures.glob("*.wildcap") if (path / "maps" / "normal.png").is_file()):
         name, truth = capture.stem, captures / capture.stem / "maps"
         if name == "sample":
-            yield ["research.benchmarks.teaser", str(capture), str(target / "teaser.jpg")]
+            yield ["research.benchmarks.pictures.teaser", str(capture), str(target / "teaser.jpg")]
         if (target / f"gallery_{name}.jpg").is_file():
             known = ["--truth", str(truth)] if truth.is_dir() else []
-            yield ["research.benchmarks.gallery", str(capture), str(target / f"gallery_{name}.jpg"), *known]
+            yield ["research.benchmarks.pictures.gallery", str(capture), str(target / f"gallery_{name}.jpg"), *known]

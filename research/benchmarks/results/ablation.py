@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from ..ablation import table
 from ..figures import Figures
+from ..maps.ablation import table
 from ..pages import Sections, prose
 
 TITLE = "What each part of the solver is worth"
@@ -31,13 +31,12 @@ def sections(ablation: Figures) -> Sections:
 
         *Texture, without texel grid, without prior, full method, truth.*
 
-        UV-space problems with known truth (`research/benchmarks/uv_problems.py`): five synthetic subjects and one
-        scanned head
-        that no training saw, three kinds of shadow each, hard and soft, with 10 % of the light beyond what second-order
-        spherical harmonics can say, noise and a texel of blur; 256 x 256, the true skin tone given, 20 steps. No
-        delighter has seen these textures: all of the light is in them. PSNR in sRGB after one gain per channel. Tie:
-        within the full method's spread over two seeds. Rows on 6 problems have one shadow per subject; the two recipes
-        of 600 steps ran on one problem.
+        UV-space problems with known truth (`research/benchmarks/maps/uv_problems.py`): five synthetic subjects and one
+        scanned head that no training saw, three kinds of shadow each, hard and soft, with 10 % of the light beyond what
+        second-order spherical harmonics can say, noise and a texel of blur; 256 x 256, the true skin tone given, 20
+        steps. No delighter has seen these textures: all of the light is in them. PSNR in sRGB after one gain per
+        channel. Tie: within the full method's spread over two seeds. Rows on 6 problems have one shadow per subject;
+        the two recipes of 600 steps ran on one problem.
         """,
                 table(ablation),
                 f"""

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from ..comparison_table import paired, paired_table, table
 from ..figures import Figures
+from ..maps.comparison_table import paired, paired_table, table
 from ..pages import Sections, prose
 
 TITLE = "Albedo against the truth, beside other light models"
@@ -37,18 +37,16 @@ def sections(comparison: Figures) -> Sections:
             "",
             prose(
                 f"""
-        The baselines are of our own writing (`research/benchmarks/light_models.py`), not those authors' code, and put
-        other
-        light models behind our solver: the same prior, guidance and start. *Regions*: five or ten soft regions with an
-        SH light each; where they lie is learned, as in DeFace, and begins as clusters of place and lightness, so they
-        are a shadow mask of sorts. *Environment*: one diffuse cubemap for the whole face, as in FLARE. *No prior*: its
-        albedo's texels follow the frames alone, smoothly. *Over its blur*: the texture divided by its own blur, what
-        one does by hand. All maps have {comparison.size} texels a side; the mean is over the six people of the
-        [gallery](gallery.md); a row's best and its ties (within half of what two seeds of ours differ by) are bold, for
-        each input apart. SSIM and FLIP are those after one gain. The head scan is filmed under the sun behind leaves
-        (`python -m research.benchmarks.scan_captures DATA FOLDER --lights leaves`); its own map, which stands for the
-        truth,
-        holds light itself.
+        The baselines are of our own writing (`research/benchmarks/maps/light_models.py`), not those authors' code, and
+        put other light models behind our solver: the same prior, guidance and start. *Regions*: five or ten soft
+        regions with an SH light each; where they lie is learned, as in DeFace, and begins as clusters of place and
+        lightness, so they are a shadow mask of sorts. *Environment*: one diffuse cubemap for the whole face, as in
+        FLARE. *No prior*: its albedo's texels follow the frames alone, smoothly. *Over its blur*: the texture divided
+        by its own blur, what one does by hand. All maps have {comparison.size} texels a side; the mean is over the six
+        people of the [gallery](gallery.md); a row's best and its ties (within half of what two seeds of ours differ by)
+        are bold, for each input apart. SSIM and FLIP are those after one gain. The head scan is filmed under the sun
+        behind leaves (`python -m research.benchmarks.captures.scan_captures DATA FOLDER --lights leaves`); its own map,
+        which stands for the truth, holds light itself.
         """,
                 table(comparison),
             ),

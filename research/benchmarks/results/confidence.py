@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from .. import confidence
 from ..figures import Figures
+from ..maps import confidence
 from ..pages import Sections
 
 TITLE = "Confidence"

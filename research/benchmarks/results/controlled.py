@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..controlled import table
 from ..figures import Figures
+from ..light.controlled import table
 from ..pages import Sections, prose
 from .comparison import by_person
 
@@ -31,10 +31,10 @@ def sections(controlled: Figures) -> Sections:
         The six people of the [gallery](gallery.md), in a dark room with a lamp at the camera (the paper's comparison
         with DoRA), and before sixteen fixed cameras in even light. The lamp's light is known and is divided out of the
         frames, its highlight found by how each place brightens as the lamp moves with the camera
-        (`research/benchmarks/flash_light.py`); the solve then holds an even light. *True frames* is the true albedo as
-        a
-        texture: what is lost there, geometry and texture lose. All maps are scored in the same frames, those of the
-        capture in the wild; moles: 1 is all of their contrast. In the studio no delighter runs and the mask is empty.
+        (`research/benchmarks/light/flash_light.py`); the solve then holds an even light. *True frames* is the true
+        albedo as a texture: what is lost there, geometry and texture lose. All maps are scored in the same frames,
+        those of the capture in the wild; moles: 1 is all of their contrast. In the studio no delighter runs and the
+        mask is empty.
         """,
                 table(controlled),
                 f"""

@@ -6,13 +6,14 @@ from __future__ import annotations
 
 from statistics import mean, stdev
 
-from .. import likenesses, scan_captures, state
-from ..delight_measures import shortfalls, table
+from ..captures import likenesses, scan_captures
+from ..captures.state_captures import DELIT, SOLVED
+from ..delighting import state
+from ..delighting.delight_measures import shortfalls, table
+from ..delighting.state_scores import mean_of
 from ..figures import Figures
 from ..measures.table import Scores, format_table, summarise
 from ..pages import Sections, prose
-from ..state_captures import DELIT, SOLVED
-from ..state_scores import mean_of
 
 TITLE = "Delighters"
 SAYS = "The network, shading and others on real photographs, portraits of six tones, the scan and the sample."
@@ -65,8 +66,8 @@ def sections(delight: Figures, before: Figures, now: Figures) -> Sections:
         - *lps_sun*: 14 frames of the head scan's capture, *sample*: 14 of the synthetic sample's, both with cameras and
           head.
         - *bearded_overcast* to *light_below*: 14 frames each of six people in soft light or under a lamp from below
-          (`python -m research.benchmarks.likenesses FOLDER`), *scan_overcast* and *scan_lamps* of the head scan
-          (`python -m research.benchmarks.scan_captures`), with true cameras.
+          (`python -m research.benchmarks.captures.likenesses FOLDER`), *scan_overcast* and *scan_lamps* of the head
+          scan (`python -m research.benchmarks.captures.scan_captures`), with true cameras.
 
         Captures are named by `--sets TRUTH --capture TRUTH=CAPTURE`. The rows *before* are by the same command at
         commit 3cc06ee0, before the fitted light expected a sky ([delighting](../method/delighting.md)) and hues in the
@@ -115,13 +116,13 @@ def after_the_solve(before: Figures, now: Figures) -> str:
     most, least = (shared[gains.index(gain)] for gain in (max(gains), min(gains)))
     return (
         prose(f"""
-        How much of the sky's worth the solve would have found by itself: {len(shared)} captures of [the state of the
-        albedo](state.md), rendered anew and taken through a delighter that expects a sky (with `--run` first), beside
-        that page's own figures, *before*. Means over
-        {len(rows[SOLVED])} people, each the mean of its captures. Of the solved albedos
-        {sum(gain > 0 for gain in gains)} of {len(gains)} came nearer to the truth in the picture, from
-        {min(gains):+.2f} dB (`{least}`) to {max(gains):+.2f} dB (`{most}`). The solver is the same but for how far
-        skins' traits differ from place to place ([the prior](prior.md)); hues in the dark were not settled yet.
+        How much of the sky's worth the solve would have found by itself: {len(shared)} captures of [the
+        state of the albedo](state.md), rendered anew and taken through a delighter that expects a sky (with `--run`
+        first), beside that page's own figures, *before*. Means over {len(rows[SOLVED])} people, each the mean of its
+        captures. Of the solved albedos {sum(gain > 0 for gain in gains)} of {len(gains)} came nearer to the truth in
+        the picture, from {min(gains):+.2f} dB (`{least}`) to {max(gains):+.2f} dB (`{most}`). The solver is the same
+        but for how far skins' traits differ from place to place ([the prior](prior.md)); hues in the dark were not
+        settled yet.
         """)
         + "\n\n"
         + "\n\n".join(

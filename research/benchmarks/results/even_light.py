@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from ..even_light import WORDS, table
 from ..figures import Figures
+from ..light.even_light import WORDS, table
 from ..pages import Sections
 
 TITLE = "What skin gives back of its albedo"

@@ -7,9 +7,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...people.lifelike.person import sample_person
+from ..captures.likenesses import LIKENESSES
 from ..figures import Figures, markdown
-from ..likenesses import LIKENESSES
-from ..open_eyes import ALONE, COLUMNS
+from ..head.open_eyes import ALONE, COLUMNS
 from ..pages import Sections, prose
 
 TITLE = "Open eyes"
@@ -34,14 +34,13 @@ def sections(record: Figures) -> Sections:
                 """
         Synthetic people with open eyes, by the eye reader (`core/face/eye_reader.py`) and the fit of
         `core/stages/registration/lid_marks.py`. *True heads*: six people in ten frames with true cameras, whose eyes
-        are
-        fitted to their own heads, half a millimetre off. *By the head alone* is what such a head says of its eyes when
-        no frame is asked: next to nothing is wrong there, since these people's lids are the template's own and open as
-        it opens them. Real lids are not, so that row is no bound: it says what following the frames costs where there
-        is nothing to follow. *Filmed* are people whose head came from their film, too: their rims are worst at the
-        eyes' corners, where the opening is thinner than the reader tells. Irises of true heads are measured over their
-        true skin (a dash: not measured), those of filmed people over the skin that the solve found; both eyes have one
-        colour, so that a person's two figures are alike.
+        are fitted to their own heads, half a millimetre off. *By the head alone* is what such a head says of its eyes
+        when no frame is asked: next to nothing is wrong there, since these people's lids are the template's own and
+        open as it opens them. Real lids are not, so that row is no bound: it says what following the frames costs where
+        there is nothing to follow. *Filmed* are people whose head came from their film, too: their rims are worst at
+        the eyes' corners, where the opening is thinner than the reader tells. Irises of true heads are measured over
+        their true skin (a dash: not measured), those of filmed people over the skin that the solve found; both eyes
+        have one colour, so that a person's two figures are alike.
         """,
                 markdown(["mean over eyes", *COLUMNS[:7]], table),
                 *filter(None, [left_out(rows)]),

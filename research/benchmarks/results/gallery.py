@@ -30,8 +30,8 @@ def sections() -> Sections:
             "",
             prose(
                 """
-        Made by `python -m research.benchmarks.people FOLDER`, then
-        `python -m research.benchmarks.gallery FOLDER/NAME.wildcap OUT.jpg
+        Made by `python -m research.benchmarks.captures.people FOLDER`, then
+        `python -m research.benchmarks.pictures.gallery FOLDER/NAME.wildcap OUT.jpg
         --truth FOLDER/NAME/maps` for each, on 2026-11-28, the people by commit 1036f6da and the sample by 4ce0418a.
 
         Each picture: captured frame, delit frame, texture, shadow mask over it, solved albedo, true albedo, solved

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from ..figures import Figures
-from ..geometry import table
+from ..head.geometry import table
 from ..pages import Sections, prose
 
 TITLE = "Geometry and texture"

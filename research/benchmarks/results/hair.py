@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from ..figures import Figures
-from ..groomed import WORDS, shortfalls, to_table
+from ..head.groomed import WORDS, shortfalls, to_table
 from ..pages import Sections
 
 TITLE = "Hair that is grown from pictures"

@@ -9,11 +9,11 @@ from importlib import import_module
 
 import numpy as np
 
-from ..comparison_table import paired
-from ..confidence import SHIPPED
+from ..captures.people import PEOPLE
 from ..figures import Figures, markdown
+from ..maps.comparison_table import paired
+from ..maps.confidence import SHIPPED
 from ..pages import Sections, prose
-from ..people import PEOPLE
 
 TITLE = "What was measured"
 RECORDS = (
@@ -117,8 +117,8 @@ def headline(of: Figures) -> str:
     return prose(
         markdown(head, rows),
         f"""
-        The true skin tone is given to all; in the first column each picture gets one gain per channel on top. On
-        sample and scan the filmed frames stand for their texture. A face takes
+        The true skin tone is given to all; in the first column each picture gets one gain
+        per channel on top. On sample and scan the filmed frames stand for their texture. A face takes
         [{costs.standard.together.minutes:.1f} minutes on 2 cores](costs.md), of 300 frames
         {costs["frames-300"].together.minutes:.1f}.
         """,
@@ -163,7 +163,8 @@ def worse_in_the_picture(gains: dict[str, float]) -> str:
 
 
 def the_synthetic(people: Iterable[str]) -> str:
-    """How many people are of research/benchmarks/likenesses.py, and how many of research/benchmarks/people.py."""
+    """How many people are of research/benchmarks/captures/likenesses.py, and how many of
+    research/benchmarks/captures/people.py."""
     made = [name for name in people if not is_scanned(name)]
     bald = [name for name in made if is_bald(name)]
     kinds = [(len(made) - len(bald), "with strands, eyes and a phone's pipeline"), (len(bald), "bald, by true cameras")]
@@ -184,12 +185,12 @@ def gains_by_kind(people: Figures) -> str:
 
 
 def is_bald(name: str) -> bool:
-    """Whether a person is of research/benchmarks/people.py."""
+    """Whether a person is of research/benchmarks/captures/people.py."""
     return any(f"{name}_".startswith(f"{person.name}_") for person in PEOPLE)
 
 
 def is_scanned(name: str) -> bool:
-    """Whether a capture, or a person, is of the head scan (research/benchmarks/scan_captures.py)."""
+    """Whether a capture, or a person, is of the head scan (research/benchmarks/captures/scan_captures.py)."""
     return name.startswith("scan_")
 
 

@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
+from ..delighting.photographs import COLUMNS, TITLES, WORDS
 from ..figures import Figures
 from ..measures.table import format_table, summarise
 from ..pages import Sections
-from ..photographs import COLUMNS, TITLES, WORDS
 
 TITLE = "Single photographs: the face that is kept and the light that is left"
 SAYS = "Real people under many lights, beside answers that do nothing, give one colour, or know the light."

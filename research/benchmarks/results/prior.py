@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from .. import traits as benchmark
 from ..figures import Figures
+from ..maps import traits as benchmark
 from ..pages import Sections, prose
 
 TITLE = "The prior"

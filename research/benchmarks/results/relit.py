@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from ..figures import Figures
+from ..light.relit import table
 from ..pages import Sections, prose
-from ..relit import table
 from .sample import TITLE as SAMPLE
 
 TITLE = "Relit"

@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from ..figures import Figures
+from ..maps.rerender import table
 from ..pages import Sections, prose
-from ..rerender import table
 
 TITLE = "Face reconstruction, as in the paper's Table 1"
 SAYS = "Albedo times shading against the frames it came from: a tie, which tells no light models apart."

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from ..albedo_score import table
 from ..figures import Figures
+from ..maps.albedo_score import table
 from ..pages import Sections, prose
 
 TITLE = "The sample video"
@@ -23,7 +23,8 @@ def sections(demo: Figures) -> Sections:
 
         *Above: a frame, the shadow mask over the delit texture, and the solved albedo, which keeps a faint outline of
         the leaves and a dark spot where one ends at the brow. Below: the head under the sun, three lamps and a window
-        (`python -m research.benchmarks.teaser`). What no camera saw well of the scalp is made up, without stubble.*
+        (`python -m research.benchmarks.pictures.teaser`). What no camera saw well of the scalp is made up, without
+        stubble.*
 
         The solved albedo against the truth, in the picture, on facial skin; the true skin tone is given (mean of
         {demo.views} frames). *After one gain*: per channel, in linear light. *Detail*: the correlation with the truth's

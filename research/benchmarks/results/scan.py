@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from ..albedo_score import table
 from ..figures import Figures
+from ..maps.albedo_score import table
 from ..pages import Sections, prose
 from .split import OLDER
 

@@ -57,15 +57,13 @@ def sections(tone: Figures, real: Figures) -> Sections:
             prose(
                 f"""
         L* of the estimate ± its stated deviation, before and after the estimate ceased to follow the ground and to be
-        drawn away from the middle (`python -m research.benchmarks.real_tones DATA FOLDER`; *before* is c1434e25). The
-        people
-        london_NNN were photographed in one light before a light ground; *white* and *black* are the same pixels of the
-        person, cut out over another ground. That moved an estimate by as much as {before:.0f} L*; now it is
-        {after:.1f}, by what the change does to the head's fit and the shadow mask. Their tones were not measured, but
-        their light is one, so they differ by their skin. Fair people in good light come out alike, dark people too
-        light;
-        who is fair in a dim picture comes out too dark (lisa1, lisa3). The stated deviation is wide where brightness
-        and colour disagree with most people's, but not wide enough for all.
+        drawn away from the middle (`python -m research.benchmarks.delighting.real_tones DATA FOLDER`; *before* is
+        c1434e25). The people london_NNN were photographed in one light before a light ground; *white* and *black* are
+        the same pixels of the person, cut out over another ground. That moved an estimate by as much as {before:.0f}
+        L*; now it is {after:.1f}, by what the change does to the head's fit and the shadow mask. Their tones were not
+        measured, but their light is one, so they differ by their skin. Fair people in good light come out alike, dark
+        people too light; who is fair in a dim picture comes out too dark (lisa1, lisa3). The stated deviation is wide
+        where brightness and colour disagree with most people's, but not wide enough for all.
         """,
                 markdown(
                     ["capture", "before", "after"],

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from .. import split
 from ..figures import Figures
+from ..maps import split
 from ..pages import Sections, prose
 
 TITLE = "Skin or light"

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from .. import state
+from ..delighting import state
 from ..figures import Figures
 from ..pages import Sections
 

@@ -11,7 +11,7 @@ from core.face import parser, template
 from core.face.parser_network import ParseNet, network_input
 from core.face.parts import BRIDGE, CHIN, PARTS, SIDE_PX, cut, inside, keep_beard, put_back, to_crop
 from core.geometry.meshes import vertex_uvs
-from research.benchmarks import parts as benchmark
+from research.benchmarks.head import parts as benchmark
 from research.people.lifelike import snapshot, unlit
 from tests.core.face.conftest import PARSER_VIEWS, TINY
 

@@ -13,7 +13,7 @@ from core.capture.messages import Problem, Reporter
 from core.face import eye_reader, parser
 from core.face.parser_network import ParseNet
 from core.face.parts import PARTS
-from research.benchmarks.parts import LIKENESSES
+from research.benchmarks.head.parts import LIKENESSES
 from research.people.identities import reserved_seeds
 from research.training import descent, eyes, snapshots
 from research.training import parser as parsing

@@ -22,7 +22,7 @@ from core.stages.cameras.matches import Matches, tracks
 from core.stages.cameras.resection import resect
 from core.stages.cameras.solving import Solved, worth
 from core.stages.cameras.world import agreeing_faces, find_head
-from research.benchmarks.cameras_against_truth import similarity
+from research.benchmarks.head.cameras_against_truth import similarity
 from research.people.painted_head import FOCAL, HEIGHT, WIDTH, place_camera
 
 IDENTITY = np.random.default_rng(3).normal(0, 0.8, len(template_landmarks().basis))

@@ -11,7 +11,7 @@ from core.solver.prior.prior import make_coordinates
 from core.solver.recipes import Recipe
 from core.solver.sampler import Sampler, seed_noise
 from core.stages.solve.prior_files import load
-from research.benchmarks.prior_figures import errors, of_subject, reflectance, sample_given_diffuse
+from research.benchmarks.maps.prior_figures import errors, of_subject, reflectance, sample_given_diffuse
 from tests.fixtures.small_problems import SIZE, observation, start
 
 DRAFT = Recipe(steps=30, coarse=(), guidance="proximal", phases=())

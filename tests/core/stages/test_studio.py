@@ -18,7 +18,7 @@ from core.geometry.views import read_views
 from core.imaging import images
 from core.settings.settings import from_json
 from core.stages import cameras, delight, frames, shadow_mask, texture
-from research.benchmarks.cameras_against_truth import similarity
+from research.benchmarks.head.cameras_against_truth import similarity
 from research.people import painted_head
 
 

@@ -60,7 +60,7 @@ def test_a_smooth_black_patch_reflects_as_fresnel_says(black_skin, tmp_path):
 @pytest.mark.parametrize("tone", [(0.58, 0.40, 0.33), (0.17, 0.085, 0.052)])
 def test_under_even_light_a_patch_without_gloss_shows_its_albedo(patch, tmp_path, tone):
     """Within 6 %, though light that goes under the skin comes back with losses: a sheet without a back loses more than
-    a head, for which it is 2 % (research/benchmarks/even_light.py); with the albedo as it is, up to 12 % were
+    a head, for which it is 2 % (research/benchmarks/light/even_light.py); with the albedo as it is, up to 12 % were
     missing."""
     srgb = [12.92 * c if c < 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055 for c in tone]
     for name, colour in (("diffuse_albedo.png", srgb), ("normal.png", FLAT), ("specular_albedo.png", (0.4,))):

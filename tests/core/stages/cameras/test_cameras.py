@@ -23,7 +23,7 @@ from core.settings.settings import from_json
 from core.stages import cameras, frames
 from core.stages.cameras.landmarks import find_landmarks
 from core.stages.cameras.world import find_head, intersect_rays
-from research.benchmarks.cameras_against_truth import similarity
+from research.benchmarks.head.cameras_against_truth import similarity
 from research.people.sample import write_video
 
 DATA = Path(__file__).resolve().parents[5] / "shared" / "data"
@@ -208,7 +208,7 @@ def test_sixteen_frames_of_a_real_video_against_its_truth(tmp_path):
     truth = DATA / "lps_sun"
     if not truth.is_dir():
         pytest.skip("lps_sun is not at hand")
-    from research.benchmarks.cameras_against_truth import compare
+    from research.benchmarks.head.cameras_against_truth import compare
 
     capture = Capture(tmp_path / "lps.wildcap")
     capture.root.mkdir()

@@ -12,8 +12,8 @@ from core.imaging import images
 from core.stages.solve import confidence
 from core.stages.solve.capture_evidence import read_evidence
 from core.stages.solve.confidence import PLAIN_DEVIATION, estimate_confidence
-from research.benchmarks import confidence as benchmark
-from research.benchmarks.confidence import Errors, fit_deviations, judge
+from research.benchmarks.maps import confidence as benchmark
+from research.benchmarks.maps.confidence import Errors, fit_deviations, judge
 from tests.fixtures.painted_skin import make, plain_evidence
 
 SIZE = 256

@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The captures of research/benchmarks/light/controlled.py and their solves: a flash in the dark, a studio's even light,
+and the true albedo for frames.
+
+Each begins from frames, cameras and head of a capture of research/benchmarks/captures/people.py, works in a copy that
+is made once, and leaves an albedo map in the same UVs."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from core.capture.capture import Capture
+from core.face import template
+from core.face.head import read_head
+from core.imaging import images
+from core.settings.settings import Settings, from_json
+from core.solver.sampler import Sampler, seed_noise
+from core.solver.start import start_solve
+from core.stages.solve import maps, recipe_of
+from core.stages.solve.capture_evidence import read_evidence
+from core.stages.solve.head_cells import make_head_cells
+from core.stages.solve.prior_files import load
+from core.stages.solve.skin_tone import read_given_tone
+
+from ..light.flash_light import write_delit
+from ..light.relit_maps import toned
+from .continued import begin_at_delight, run_stages
+
+EMPTY = np.zeros((64, 64), np.float32)
+
+
+def flash(source: Capture, work: Capture, settings: Settings) -> Capture:
+    """The dark room's capture up to its texture, with an empty mask; made once."""
+    if not work.texture_confidence.is_file():
+        begin_at_delight(source, work.root)
+        write_delit(work, work.root / "without_lamp")
+        dark = from_json({"delight": {"delighter": "folder", "folder": str(work.root / "without_lamp")}}, settings)
+        run_stages(work, dark, "delight", "texture")
+    images.write_data(work.shadow_mask_auto, EMPTY)
+    return work
+
+
+def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict]:
+    """The solver's albedo, sRGB [S, S, 3], where the light is known and gone: even, one colour, held throughout; and
+    the seconds."""
+    began, prior = time.monotonic(), _prior()
+    recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0, linear=0.0)
+    evidence = read_evidence(capture, read_head(capture), settings.solve.size)
+    start = start_solve(
+        prior,
+        evidence,
+        read_given_tone(settings.solve.skin_tone).tensor,
+        evidence.cell_side(settings.solve.grid_cells),
+        recipe,
+        make_head_cells,
+    )
+    sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(settings.seed))
+    state = sampler.sample(start.observations, start.state)
+    diffuse = maps.finish_maps(state, evidence, start).diffuse
+    return images.linear_to_srgb(diffuse), {"seconds": round(time.monotonic() - began, 1)}
+
+
+def studio(source: Capture, work: Capture, settings: Settings) -> Capture:
+    """The studio's capture up to the proposed mask; the mask that counts is empty. Made once."""
+    if not work.shadow_mask.is_file():
+        begin_at_delight(source, work.root)
+        run_stages(work, from_json({"delight": {"delighter": "none"}}, settings), "delight", "texture", "shadow_mask")
+        images.write_data(work.shadow_mask, EMPTY)
+    return work
+
+
+def by_the_stage(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict]:
+    """The solve stage's albedo, sRGB [S, S, 3]; its seconds, and the share of the seen face that the proposed mask
+    would have covered, in percent."""
+    began = time.monotonic()
+    run_stages(capture, from_json({"delight": {"delighter": "none"}}, settings), "solve")
+    seconds, proposed = time.monotonic() - began, images.read_mask(capture.shadow_mask_auto)
+    face = template.mask("face", len(proposed)) * images.read_data(capture.texture_confidence)[..., 0]
+    share = {"proposed_mask_percent": round(100 * float((proposed * face).sum() / face.sum()), 2)}
+    return images.read_srgb(capture.maps / "diffuse_albedo.png"), {"seconds": round(seconds, 1), **share}
+
+
+def use_true_frames(source: Capture, truth: Path, work: Capture, settings: Settings) -> Capture:
+    """Has the wild capture's true albedo frames stand for delit ones, up to the texture; made once.
+
+    Parameters
+    ----------
+    source : the wild capture
+    truth : its folder, with albedo/NNNN.png
+    work : the copy that is made
+    settings : of all stages but delight
+
+    Returns
+    -------
+    `work`.
+    """
+    if not work.texture_confidence.is_file():
+        begin_at_delight(source, work.root)
+        true = from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings)
+        run_stages(work, true, "delight", "texture")
+    return work
+
+
+def as_albedo(capture: Capture, settings: Settings) -> np.ndarray:
+    """The texture whose confident facial skin has been brought to the skin tone, sRGB [S, S, 3]."""
+    texture = images.read_linear(capture.texture)
+    tone = np.array(read_given_tone(settings.solve.skin_tone).linear, np.float32)
+    skin = images.read_data(capture.texture_confidence)[..., 0] * template.mask("skin", len(texture))
+    return images.linear_to_srgb(toned(texture, tone, skin))
+
+
+@cache
+def _prior():
+    return load()

@@ -1,0 +1,200 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The captures that research/benchmarks/delighting/state.py measures, as maps in the UVs of their heads: the answers,
+the truth as their own cameras show it, and the normals.
+
+A folder holds NAME.wildcap and beside it, or in another folder, NAME/ with the truth
+(research/benchmarks/maps/albedo_score.py says its layout; head.obj, the true head, tells which captures show the same
+person; maps/part_NAME.png are masks in the head's UVs, where there are any)."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from core.capture.capture import Capture
+from core.capture.hashes import hash_file
+from core.face import template
+from core.face.head import Head, read_head
+from core.geometry.raster import interpolate
+from core.imaging import images
+from core.settings.settings import Settings
+
+from ..measures.features_kept import BARE
+from ..measures.references import BLUR, FLAT, NOTHING, TRUE, blur_divided_out, flat_colour
+from .controlled_captures import use_true_frames
+
+SIZE = 512
+"""Side of the maps on which measures in UV space are taken: a texel is about half a millimetre."""
+SEEN = 0.3
+"""Least confidence of a texture, of the delit and of the true frames', at texels that count."""
+DELIT, SOLVED = "delit texture", "solved"
+METHODS = (NOTHING, FLAT, BLUR, TRUE, DELIT, SOLVED)
+PARTS = ("skin", "brows", "lips", "eyes")
+
+
+@dataclass(frozen=True)
+class Filmed:
+    """One capture with its truth; person: the name of the first truth, in order of names, with the same true head;
+    work: where what is made of it is kept."""
+
+    name: str
+    person: str
+    capture: Capture
+    truth: Path
+    work: Path
+
+    @cached_property
+    def head(self) -> Head:
+        return read_head(self.capture)
+
+    @cached_property
+    def true_capture(self) -> Capture:
+        """A copy whose delit frames are the true albedo, up to its texture; made once, and again where the head or the
+        cameras changed."""
+        copy = Capture(self.work / f"{self.name}.wildcap")
+        same = ("head.obj", "cameras/cameras.bin", "cameras/images.bin")
+        changed = copy.texture_confidence.is_file() and any(
+            hash_file(copy.root / name) != hash_file(self.capture.root / name) for name in same
+        )
+        if changed:
+            copy.texture_confidence.unlink()
+        return use_true_frames(self.capture, self.truth, copy, Settings())
+
+    def inputs(self) -> list[Path]:
+        """The files that the figures of this capture depend on, but for the truth's pictures."""
+        capture = self.capture
+        return [
+            path
+            for path in (
+                capture.head,
+                capture.texture_filmed,
+                capture.texture,
+                capture.texture_confidence,
+                capture.maps / "diffuse_albedo.png",
+                self.truth / "cameras.json",
+                self.truth / "head.obj",
+            )
+            if path.is_file()
+        ]
+
+    @cached_property
+    def truth_map(self) -> np.ndarray:
+        """The texture of the true albedo frames, linear [S, S, 3] at its own size."""
+        return images.read_linear(self.true_capture.texture)
+
+    @cached_property
+    def where(self) -> np.ndarray:
+        """bool [SIZE, SIZE]: texels of the face that the capture and its true frames saw well. Of a person's own eyes
+        and their lashes there are none: the true frames have them painted on the lids, where an answer has lids that
+        were completed from around."""
+        seen = [
+            images.resize(images.read_data(capture.texture_confidence)[..., 0], SIZE, SIZE) > SEEN
+            for capture in (self.capture, self.true_capture)
+        ]
+        face = (template.mask("face", SIZE) > 0.5) & seen[0] & seen[1]
+        eyes = self.own_parts().get("eyes")
+        if eyes is None:
+            return face
+        reach = 2 * round(BARE * np.ptp(landmarks_in_uv()[:, 0])) + 1
+        return face & ~(cv2.dilate(eyes.astype(np.uint8), np.ones((reach, reach), np.uint8)) > 0)
+
+    def answer(self, method: str) -> np.ndarray | None:
+        """What a method takes for the albedo, linear [S, S, 3]; None where the capture was not taken so far."""
+        if method == TRUE:
+            return self.truth_map
+        paths = {DELIT: self.capture.texture, SOLVED: self.capture.maps / "diffuse_albedo.png"}
+        path = paths.get(method, self.capture.texture_filmed)
+        if not path.is_file():
+            return None
+        answer = images.read_linear(path)
+        if method in (FLAT, BLUR):
+            where = images.resize(self.where.astype(np.float32), len(answer), len(answer)) > 0.5
+            return (flat_colour if method == FLAT else blur_divided_out)(answer, where)
+        return answer
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Unit normals [SIZE, SIZE, 3] in the axes of the built-in head, however the capture's world lies; zero off the
+        head."""
+        unfolded = self.head.unfold(SIZE)
+        return unfolded.spread(unfolded.normals @ rotation_between(self.head.mesh.vertices, template.load().vertices).T)
+
+    def parts(self) -> dict[str, np.ndarray]:
+        """Part -> bool [SIZE, SIZE]: the truth's own masks where it has any, else those of the built-in head, where
+        they are at least half as dense as where they are densest. Skin is what no other part has."""
+        found = {name: _dense(template.mask(name, SIZE)) for name in PARTS} | self.own_parts()
+        others = np.logical_or.reduce([mask for name, mask in found.items() if name != "skin"])
+        return {**found, "skin": found["skin"] & ~others}
+
+    def own_parts(self) -> dict[str, np.ndarray]:
+        """Part -> bool [SIZE, SIZE]: the truth's own masks; none where the head's eyes are closed and it has no
+        hair."""
+        return {
+            path.stem.removeprefix("part_"): _dense(images.read_mask(path))
+            for path in sorted((self.truth / "maps").glob("part_*.png"))
+        }
+
+
+def _dense(mask: np.ndarray) -> np.ndarray:
+    """bool [SIZE, SIZE]: where a mask is at least half as dense as where it is densest."""
+    soft = images.resize(mask, SIZE, SIZE)
+    return soft > 0.5 * max(float(soft.max()), 1e-3)
+
+
+def find(folder: Path, truths: Path, work: Path) -> list[Filmed]:
+    """The captures of a folder that have a texture and a truth, in order of their names. Who a person is, the truths
+    say: the name stays when a capture is finished later than others."""
+    first: dict[str, str] = {}
+    for truth in sorted(path.parent for path in truths.glob("*/albedo") if path.is_dir()):
+        first.setdefault(_true_head(truth), truth.name)
+    pairs = [(path.stem, Capture(path), truths / path.stem) for path in sorted(folder.glob("*.wildcap"))]
+    pairs = [
+        (name, capture, truth)
+        for name, capture, truth in pairs
+        if capture.texture.is_file() and (truth / "albedo").is_dir()
+    ]
+    return [Filmed(name, first[_true_head(truth)], capture, truth, work) for name, capture, truth in pairs]
+
+
+def add_captures(parser: argparse.ArgumentParser) -> None:
+    """The arguments that name captures with a truth."""
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--truths", type=Path, help="where NAME/ with the truth lies, if not in FOLDER")
+    parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
+
+
+def captures_asked(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> list[Filmed]:
+    """The captures that these arguments name; ends with an error where there are none."""
+    folder = arguments.folder.resolve()
+    found = [
+        filmed
+        for filmed in find(folder, (arguments.truths or folder).resolve(), folder / "state")
+        if filmed.name.startswith(tuple(arguments.only))
+    ]
+    if not found:
+        parser.error(f"{folder} holds no capture with a texture and a truth.")
+    return found
+
+
+def landmarks_in_uv(size: int = SIZE) -> np.ndarray:
+    """The 468 landmarks on a map of the built-in head, [468, 2] in texels."""
+    mesh, (face, bary) = template.load(), template.landmarks()
+    uv = interpolate(mesh.uvs, mesh.face_uvs, face, bary)
+    return np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * size
+
+
+def rotation_between(points: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """The rotation [3, 3] that brings points [N, 3] nearest to targets [N, 3] of the same order (Kabsch 1976)."""
+    u, _, vt = np.linalg.svd((points - points.mean(0)).T @ (targets - targets.mean(0)))
+    return vt.T @ np.diag([1, 1, np.sign(np.linalg.det(vt.T @ u.T))]) @ u.T
+
+
+def _true_head(truth: Path) -> str:
+    """What tells two people apart: the true head, or the truth itself where it has none."""
+    return hash_file(truth / "head.obj") if (truth / "head.obj").is_file() else str(truth)

@@ -1,0 +1,316 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far a delighter of single photographs keeps the face and takes the light: features kept, agreement across lights,
+and the two slopes.
+
+    python -m research.benchmarks.delighting.photographs [--data DIR] [--delighter NAME] [--weights FILE] [--sets NAME
+        ...] [--subjects N]
+                                     [--json PATH] [--pictures FOLDER]
+
+Sets: faceolat (two people under twelve lights each, with their albedo and landmarks.json), lamps (DIR/near_ps_human1: a
+man with brows and a beard under seven lamps, ambient light subtracted; the merge of what each lamp lights stands for
+the truth), pairs (research/benchmarks/delighting/pairs.py, --subjects of each group of skin tone). Rows: the four
+references of research/benchmarks/measures/references.py, and the delighter. Pictures of real people are written only
+where --pictures says."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from core.capture.messages import Problem
+from core.face import faces
+from core.imaging import images
+from core.settings.settings import Settings
+from core.stages import delight
+
+from .. import figures
+from ..measures.agreement import disagreement
+from ..measures.features_kept import contrast_kept, contrasts, joint
+from ..measures.pictures import detail, log_green
+from ..measures.references import BLUR, FLAT, NOTHING, TRUE, blur_divided_out, flat_colour
+from ..measures.slopes import slope
+from ..measures.table import Column, Scores, format_table, summarise, to_record
+from ..measures.tone import psnr_after_gain, to_decibels
+from .delight_portraits import subjects_by_tone
+from .pairs import pairs
+
+SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
+COMMAND = "python -m research.benchmarks.delighting.photographs --json research/records/photographs.json"
+LIT = 0.05
+"""Share of a lit picture's 98th percentile above which a pixel is lit by its lamp."""
+COLUMNS = {
+    "psnr": Column("PSNR, dB"),
+    "detail": Column("detail"),
+    "kept_brows": Column("brows", 2, 0),
+    "kept_eyes": Column("eyes", 2, 0),
+    "kept_lips": Column("lips", 2, 0),
+    "kept_chin": Column("chin", 2, 0),
+    "lost": Column("mean abs(1 - kept)", 2, -1),
+    "between_lights": Column("between lights", 2, -1),
+    "agreement": Column("agreement, dB"),
+    "light_slope": Column("slope by light", 2, -1),
+    "pigment_slope": Column("slope by pigment"),
+}
+TITLES = {
+    "faceolat": "Two people under twelve lights each",
+    "lamps": "A bearded man under seven lamps",
+    "pairs": "Pairs that differ in the pigment alone, or in the light alone",
+}
+WORDS = (
+    "PSNR after one gain per channel, and *detail*, the correlation with the truth's log green between 1 and 3 "
+    "px. *Brows, eyes, lips, chin*: share of "
+    "the truth's contrast that is kept, the median over the lights; mean abs(1 - kept) of brows and eyes, each "
+    "picture apart; the deviation of kept "
+    "between the lights over the untouched photographs'. *Agreement*: PSNR of the mean squared difference between "
+    "the answers to two lights, each pair "
+    "at the truth's tone. *Slopes*: how far the answer follows a change of the light alone, and of the pigment "
+    "alone. ± is the spread over people, with pairs over groups of skin tone."
+)
+
+
+@dataclass(frozen=True)
+class LightSeries:
+    """A person under several lights, the head held still. srgb: the pictures [H, W, 3]; albedo: the truth, linear [H,
+    W, 3]; landmarks [468, 2] in pixels; face bool [H, W]; lit: per picture the pixels bool [H, W] that count."""
+
+    name: str
+    srgb: list[np.ndarray]
+    albedo: np.ndarray
+    landmarks: np.ndarray
+    face: np.ndarray
+    lit: list[np.ndarray]
+
+    @cached_property
+    def linear(self) -> list[np.ndarray]:
+        return [images.srgb_to_linear(picture) for picture in self.srgb]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, default=SHARED)
+    parser.add_argument(
+        "--delighter", choices=[name for name in delight.PHOTOGRAPHERS if name != "none"], default="network"
+    )
+    parser.add_argument(
+        "--weights",
+        type=Path,
+        help="weights of our network, with their card beside them, instead of those that are shipped",
+    )
+    parser.add_argument("--sets", nargs="+", choices=TITLES, default=list(TITLES))
+    parser.add_argument("--subjects", type=int, default=2, help="of each group of skin tone")
+    parser.add_argument("--json", type=Path, help="where the record goes, research/records/photographs.json")
+    parser.add_argument(
+        "--pictures", type=Path, help="folder for PERSON.png: three lights, and a row per answer; of real people"
+    )
+    asked = parser.parse_args()
+    if asked.weights:
+        importlib.import_module("core.stages.delight.network").WEIGHTS = asked.weights
+    text, record = [("", WORDS)], {}
+    for name in asked.sets:
+        try:
+            scores = (
+                of_pairs(asked.subjects, asked.delighter)
+                if name == "pairs"
+                else of_sitters(SITTERS[name](asked.data), asked.delighter, asked.pictures)
+            )
+        except Problem as problem:
+            text.append((TITLES[name], f"Not measured: {problem.problem} {problem.remedy}"))
+            continue
+        found = summarise(scores, COLUMNS)
+        text.append((TITLES[name], format_table(found, COLUMNS, "answer")))
+        record[name] = to_record(found, scores)
+    print("\n\n".join(f"{heading}\n\n{body}" for heading, body in text))
+    if asked.json:
+        figures.write_record(asked.json, "photographs", COMMAND, record, keep=True)
+    return 0
+
+
+def answer_photograph(srgb: np.ndarray, albedo: np.ndarray, lit: np.ndarray, delighter: str) -> dict[str, np.ndarray]:
+    """All answers to one photograph. A picture that the delighter refuses is taken as it is, as an artist would.
+
+    Parameters
+    ----------
+    srgb : [H, W, 3]
+    albedo : [H, W, 3], linear, the truth
+    lit : bool [H, W], the pixels of the face that show something
+    delighter : a key of delight.PHOTOGRAPHERS
+
+    Returns
+    -------
+    Answer -> linear albedo [H, W, 3].
+    """
+    linear = images.srgb_to_linear(srgb)
+    try:
+        answer = delight.PHOTOGRAPHERS[delighter](srgb, Settings().delight)[0]
+        ours = images.srgb_to_linear(np.asarray(answer, np.float32))
+    except Problem as problem:
+        print(problem, file=sys.stderr)
+        ours = linear
+    return {
+        NOTHING: linear,
+        FLAT: flat_colour(linear, lit),
+        BLUR: blur_divided_out(linear, lit),
+        TRUE: albedo,
+        delighter: ours,
+    }
+
+
+def of_sitters(sitters: Iterator[LightSeries], delighter: str, pictures: Path | None = None) -> Scores:
+    """Answer -> person -> figures of COLUMNS."""
+    scores: Scores = {}
+    for sitter in sitters:
+        given = [
+            answer_photograph(srgb, sitter.albedo, lit, delighter)
+            for srgb, lit in zip(sitter.srgb, sitter.lit, strict=True)
+        ]
+        for answer in given[0]:
+            scores.setdefault(answer, {})[sitter.name] = of_sitter(sitter, [each[answer] for each in given])
+        if pictures:
+            images.write_srgb(pictures / f"{sitter.name}.png", sheet(sitter, given))
+    return scores
+
+
+def of_sitter(sitter: LightSeries, answers: list[np.ndarray]) -> dict[str, float | None]:
+    """The figures of one answer to all of a sitter's pictures; answers linear [H, W, 3]."""
+    true = images.linear_to_srgb(sitter.albedo)
+    log_true, truths = log_green(true), [contrasts(true, sitter.landmarks, lit) for lit in sitter.lit]
+    shares, filmed = (
+        [
+            contrast_kept(contrasts(images.linear_to_srgb(np.clip(picture, 0, 1)), sitter.landmarks, lit), truth)
+            for picture, lit, truth in zip(each, sitter.lit, truths, strict=True)
+        ]
+        for each in (answers, sitter.linear)
+    )
+    errors, slopes = [], []
+    for i, j in combinations(range(len(answers)), 2):
+        both = sitter.lit[i] & sitter.lit[j]
+        if both.sum() > 1000:
+            errors.append(disagreement([answers[i][both], answers[j][both]], sitter.albedo[both].mean(0)))
+            slopes.append(slope((answers[i], answers[j]), (sitter.linear[i], sitter.linear[j]), both))
+    return {
+        "psnr": float(
+            np.mean([psnr_after_gain(a[lit], sitter.albedo[lit]) for a, lit in zip(answers, sitter.lit, strict=True)])
+        ),
+        "detail": float(
+            np.mean(
+                [
+                    detail(log_green(images.linear_to_srgb(np.clip(a, 0, 1))), log_true, lit)
+                    for a, lit in zip(answers, sitter.lit, strict=True)
+                ]
+            )
+        ),
+        **{
+            f"kept_{name}": float(np.median([one[name] for one in shares if name in one]))
+            for name in ("brows", "eyes", "lips", "chin")
+            if any(name in one for one in shares)
+        },
+        **joint(shares, filmed),
+        "agreement": to_decibels(float(np.mean(errors))) if errors else None,
+        "light_slope": float(np.mean([s for s in slopes if s is not None])) if slopes else None,
+    }
+
+
+def of_pairs(subjects: int, delighter: str) -> Scores:
+    """Answer -> group of skin tone -> the two slopes, means over the group."""
+    found: dict[str, dict[str, dict[str, list[float]]]] = {}
+    for pair in pairs(subjects_by_tone(subjects)):
+        given = [
+            answer_photograph(srgb, albedo, pair.where, delighter)
+            for srgb, albedo in zip(pair.pictures, pair.albedos, strict=True)
+        ]
+        causes = (
+            pair.albedos if pair.kind == "pigment" else tuple(images.srgb_to_linear(srgb) for srgb in pair.pictures)
+        )
+        for answer in given[0]:
+            value = slope((given[0][answer], given[1][answer]), causes, pair.where)
+            if value is not None:
+                of_group = found.setdefault(answer, {}).setdefault(pair.group, {})
+                of_group.setdefault(f"{pair.kind}_slope", []).append(value)
+        print(pair.name, file=sys.stderr, flush=True)
+    return {
+        answer: {group: {name: float(np.mean(values)) for name, values in row.items()} for group, row in groups.items()}
+        for answer, groups in found.items()
+    }
+
+
+def light_stage_sitters(data: Path) -> Iterator[LightSeries]:
+    """The people of DATA/faceolat. Raises Problem where it is not there."""
+    folder = data / "faceolat"
+    if not (folder / "landmarks.json").is_file():
+        raise Problem(f"{folder} has no landmarks.json.", "Name the folder that holds faceolat with --data.")
+    for name, points in json.loads((folder / "landmarks.json").read_text(encoding="utf-8")).items():
+        person, camera = name.split("_")
+        face = images.read_mask(folder / "align_mask_face" / f"{name}.png") > 0.5
+        pictures = [images.read_srgb(path) for path in sorted((folder / "align_image" / person / camera).glob("*.png"))]
+        yield LightSeries(
+            person,
+            pictures,
+            images.read_linear(folder / "align_diffuse" / f"{name}.png"),
+            np.array(points, float),
+            face,
+            [face] * len(pictures),
+        )
+
+
+def lamp_sitters(data: Path) -> Iterator[LightSeries]:
+    """The man of DATA/near_ps_human1, brightened to a usual exposure. Raises Problem where he is not there or no face
+    is found."""
+    folder = data / "near_ps_human1"
+    paths = sorted(folder.glob("[0-9]*.png"))
+    if not paths or not (folder / "ambient.png").is_file():
+        raise Problem(
+            f"{folder} holds no pictures under lamps.", "Name the folder that holds near_ps_human1 with --data."
+        )
+    ambient = images.read_linear(folder / "ambient.png")
+    lit = [np.maximum(images.read_linear(path) - ambient, 0) for path in paths]
+    lit = [np.clip(0.6 * picture / np.percentile(picture, 98), 0, 1).astype(np.float32) for picture in lit]
+    found = faces.detect(images.linear_to_srgb(np.mean(lit, axis=0)))
+    if found is None:
+        raise Problem("No face was found in the mean of the pictures.", "Look at the pictures.")
+    points, hull = found.landmarks[:, :2], np.zeros(ambient.shape[:2], np.uint8)
+    cv2.fillConvexPoly(hull, cv2.convexHull(np.round(points).astype(np.int32)), 1)
+    reached = [(picture.mean(-1) > LIT * np.percentile(picture.mean(-1), 98)) & (hull > 0) for picture in lit]
+    everywhere, weight = np.logical_or.reduce(reached), sum(picture.mean(-1, keepdims=True) for picture in lit)
+    # by its own brightness: no seam where a lamp ends
+    merge = sum(picture * picture.mean(-1, keepdims=True) for picture in lit) / np.maximum(weight, 1e-6)
+    yield LightSeries(
+        "bearded man",
+        [images.linear_to_srgb(picture) for picture in lit],
+        merge.astype(np.float32),
+        points,
+        everywhere,
+        reached,
+    )
+
+
+SITTERS: dict[str, Callable[[Path], Iterator[LightSeries]]] = {"faceolat": light_stage_sitters, "lamps": lamp_sitters}
+
+
+def sheet(sitter: LightSeries, answers: list[dict[str, np.ndarray]], side: int = 256) -> np.ndarray:
+    """Three of a sitter's lights, a row per answer at the truth's tone; sRGB."""
+    rows, columns = (np.flatnonzero(sitter.face.any(axis)) for axis in (1, 0))
+    box, tone = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1], sitter.albedo[sitter.face].mean(0)
+    shown = []
+    for name in answers[0]:
+        row = []
+        for i in range(0, len(answers), max(1, len(answers) // 3)):
+            answer, lit = answers[i][name], sitter.lit[i]
+            toned = np.clip(answer * tone / np.maximum(answer[lit].mean(0), 1e-6), 0, 1)
+            row.append(images.resize(images.linear_to_srgb(toned)[box], side, side))
+        shown.append(row)
+    return np.vstack([np.hstack(row) for row in shown])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,180 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How well the automatic shadow mask finds the true shadow inside the face:
+
+    python -m research.benchmarks.delighting.shadow_mask [--seeds N ...] [--capture CAPTURE TRUTH] [--delighters NAME
+        ...] [--work FOLDER] [--pictures]
+
+Of each synthetic subject (seeds that nothing was chosen on) a capture is made, delit by each of the delighters and
+textured. A CAPTURE that has been run up to its texture from TRUTH/capture.mp4 is judged as it is, against TRUTH/shadow.
+Printed per mask: intersection over union, precision and recall over the facial skin that was seen, the F-score of its
+border at 3 texels of a 1024 map, and the processor's seconds that the stage shadow_mask took.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import tempfile
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from core.capture.capture import Capture
+from core.face import template
+from core.imaging import images
+from core.settings.settings import from_json
+
+from ..captures.continued import begin_at_delight, run_stages
+from ..captures.shadow_captures import KINDS, SIZE, lifted_truth, synthetic_capture
+from ..figures import write_record
+
+HELD_OUT = (200, 201, 202, 203, 204, 205)
+NEAR = 3.0  # texels of a 1024 map
+COLUMNS = ("true", "masked", "IoU", "precision", "recall", "border F", "CPU seconds")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        prog="python -m research.benchmarks.delighting.shadow_mask",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--seeds", type=int, nargs="*", default=HELD_OUT)
+    parser.add_argument("--capture", type=Path, nargs=2, action="append", default=[], metavar=("CAPTURE", "TRUTH"))
+    parser.add_argument("--delighters", nargs="+", default=["shading", "none"])
+    parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_shadow_masks")
+    parser.add_argument(
+        "--pictures",
+        action="store_true",
+        help="leave the filmed texture, the true mask and the proposal side by side in the work folder",
+    )
+    parser.add_argument(
+        "--json",
+        type=Path,
+        help="where the figures go, such as research/records/shadow_mask.json; those of other rows stay",
+    )
+    asked = parser.parse_args()
+    found: dict[str, dict] = {}
+    print("| capture | delighter | " + " | ".join(COLUMNS) + " |\n| --- | --- |" + " --- |" * len(COLUMNS))
+    for delighter in asked.delighters:
+        names = [f"synthetic {seed}, {KINDS[seed % len(KINDS)]}" for seed in asked.seeds]
+        rows = [
+            _row(*_synthetic(seed, delighter, asked.work), name, delighter, asked)
+            for seed, name in zip(asked.seeds, names, strict=True)
+        ]
+        found |= {f"{name}, {delighter}": _figures(name, delighter, row) for name, row in zip(names, rows, strict=True)}
+        if len(rows) > 1:
+            _print("mean of the synthetic", delighter, np.mean(rows, 0))
+    for capture, truth in asked.capture:
+        delighter = _delighter_of(Capture(capture))
+        row = _row(*_filmed(capture, truth, asked.work), capture.stem, delighter, asked)
+        found[f"{capture.stem}, {delighter}"] = _figures(capture.stem, delighter, row)
+    if asked.json:
+        write_record(
+            asked.json,
+            "shadow_mask",
+            "python -m research.benchmarks.delighting.shadow_mask",
+            {"rows": found},
+            keep=True,
+        )
+
+
+def scores(proposed: np.ndarray, true: np.ndarray, judged: np.ndarray) -> tuple[float, ...]:
+    """Shares of the judged texels that are in shadow and masked, intersection over union, precision, recall and the
+    F-score of the border at NEAR texels of a 1024 map, of masks bool [S, S] over texels bool [S, S]."""
+    both = (proposed & true)[judged].sum()
+    reach = NEAR * len(proposed) / 1024
+    borders = [
+        _border(mask) & cv2.erode(judged.astype(np.uint8), np.ones((5, 5))).astype(bool) for mask in (proposed, true)
+    ]
+    hits = [
+        float((_distance(other) <= reach)[own].mean()) if own.any() else 0.0 for own, other in (borders, borders[::-1])
+    ]
+    return (
+        float(true[judged].mean()),
+        float(proposed[judged].mean()),
+        float(both / max((proposed | true)[judged].sum(), 1)),
+        float(both / max(proposed[judged].sum(), 1)),
+        float(both / max(true[judged].sum(), 1)),
+        2 * hits[0] * hits[1] / max(sum(hits), 1e-9),
+    )
+
+
+def _row(
+    capture: Capture, true: np.ndarray, name: str, delighter: str, arguments: argparse.Namespace
+) -> tuple[float, ...]:
+    began = time.process_time()
+    _run(capture, delighter, "shadow_mask")
+    seconds = time.process_time() - began
+    mask = images.resize(images.read_mask(capture.shadow_mask_auto), SIZE, SIZE)
+    confidence = images.resize(images.read_data(capture.texture_confidence)[..., 0], SIZE, SIZE)
+    skin = (template.mask("skin", SIZE) > 0.5) & (template.mask("face", SIZE) > 0.5)
+    found = (*scores(mask > 0.5, true, skin & (confidence > 0.1)), seconds)
+    _print(name, delighter, found)
+    if arguments.pictures:
+        path = capture.texture_filmed if capture.texture_filmed.is_file() else capture.texture_png
+        filmed = images.resize(images.read_srgb(path), SIZE, SIZE)
+        grey = [np.repeat(m.astype(np.float32)[..., None], 3, -1) for m in (true, mask)]
+        images.write_srgb(arguments.work / f"{capture.root.stem}_{delighter}.png", np.hstack([filmed, *grey]))
+    return found
+
+
+def _figures(name: str, delighter: str, scores: tuple[float, ...]) -> dict:
+    return {
+        "capture": name,
+        "delighter": delighter,
+        **{column.lower().replace(" ", "_"): value for column, value in zip(COLUMNS, scores, strict=True)},
+    }
+
+
+def _print(name: str, delighter: str, scores) -> None:
+    print(
+        f"| {name} | {delighter} | " + " | ".join(f"{v:.2f}" for v in scores[:-1]) + f" | {scores[-1]:.1f} |",
+        flush=True,
+    )
+
+
+def _synthetic(seed: int, delighter: str, work: Path) -> tuple[Capture, np.ndarray]:
+    capture, true = synthetic_capture(seed, KINDS[seed % len(KINDS)], work / f"{seed}.wildcap")
+    return _delit(capture, delighter, work / f"{seed}_{delighter}.wildcap"), true
+
+
+def _filmed(source: Path, truth: Path, work: Path) -> tuple[Capture, np.ndarray]:
+    """A copy of the capture up to its texture."""
+    copy = Capture(work / f"{source.stem}_copy.wildcap")
+    shutil.rmtree(copy.root, ignore_errors=True)
+    shutil.copytree(
+        source, copy.root, ignore=shutil.ignore_patterns("maps*", "checkpoints", "delivery", "renders", "lock")
+    )
+    return copy, lifted_truth(copy, truth)
+
+
+def _delighter_of(capture: Capture) -> str:
+    return str(capture.read()["stages"]["delight"]["figures"]["delighter"])
+
+
+def _delit(capture: Capture, delighter: str, folder: Path) -> Capture:
+    """A copy of what the delighter needs, delit and textured by today's code."""
+    copy = begin_at_delight(capture, folder)
+    _run(copy, delighter, "delight", "texture")
+    return copy
+
+
+def _run(capture: Capture, delighter: str, *stages: str) -> None:
+    settings = from_json({"delight": {"delighter": delighter}, "texture": {"size": SIZE}})
+    run_stages(capture, settings, *stages)
+
+
+def _border(mask: np.ndarray) -> np.ndarray:
+    return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((2, 2), np.uint8)) > 0
+
+
+def _distance(border: np.ndarray) -> np.ndarray:
+    return cv2.distanceTransform((~border).astype(np.uint8), cv2.DIST_L2, 5)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,156 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What research.benchmarks.head.geometry found, as Markdown."""
+
+from __future__ import annotations
+
+from ..figures import markdown, number
+
+ROWS = {
+    "average": "plain average (L2)",
+    "blend": "blend",
+    "aligned": "aligned blend",
+    "perceptual": "with perceptual step",
+    "delit": "aligned, own delit frames, after one gain",
+}
+
+
+def table(figures: dict[str, dict]) -> str:
+    """The tables of {capture: figures of geometry.measure_capture}; what was not measured is a dash or is said."""
+    results = figures
+    tables = [_cameras(results), _surfaces(results), _textures(results), _costs(results)]
+    stopped = [
+        f"- **{name}** stopped at {s['stage']}: {s['problem']} {s['remedy']}"
+        for name, figures in results.items()
+        if (s := figures.get("stopped"))
+    ]
+    failed = [
+        f"- **{name}**, {part}: not measured ({figures[part]['not_measured']})"
+        for name, figures in results.items()
+        for part in ("cameras", "scan", "head", "texture")
+        if "not_measured" in figures.get(part, {})
+    ]
+    return "\n\n".join([*tables, *(["\n".join([*stopped, *failed])] if stopped or failed else [])])
+
+
+def published(results: dict[str, dict]) -> dict[str, dict]:
+    """What of the results goes into the record: all but the stages' own figures that no table shows, and pictures."""
+    return {
+        name: {
+            part: {**of, "own": _millimetres(of["own"])} if isinstance(of, dict) and "own" in of else of
+            for part, of in figures.items()
+            if part != "picture"
+        }
+        for name, figures in results.items()
+    }
+
+
+def _millimetres(own: dict) -> dict:
+    return {key: value for key, value in own.items() if isinstance(value, int | float) and "mm" in key}
+
+
+def _cameras(results: dict) -> str:
+    rows = []
+    for name, figures in results.items():
+        c = figures.get("cameras", {})
+        t = c.get("against_truth", {})
+        rows.append(
+            [
+                name,
+                c.get("frames", "-"),
+                number(c.get("registered_percent"), 0, " %"),
+                number(c.get("reprojection_px"), 2, " px"),
+                number(t.get("centre_error_median_percent"), 3, " %"),
+                number(t.get("rotation_error_median_deg"), 2, "°"),
+                number(t.get("focal_px"), 0, f" px of {t['true_focal_px']:.0f}" if "true_focal_px" in t else ""),
+            ]
+        )
+    return markdown(
+        [
+            "cameras",
+            "frames",
+            "registered",
+            "reprojection",
+            "centres (median, of the distance)",
+            "rotations (median)",
+            "focal length",
+        ],
+        rows,
+    )
+
+
+def _surfaces(results: dict) -> str:
+    rows = []
+    for name, figures in results.items():
+        for part in ("scan", "head"):
+            t = figures.get(part, {}).get("against_truth")
+            if t:
+                rows.append(
+                    [
+                        f"{name}: {part}",
+                        *(
+                            number(t.get(kind, {}).get(f"{share}_mm"), 2, " mm")
+                            for kind in ("by_cameras", "after_icp")
+                            for share in ("median", "p90", "p95")
+                        ),
+                    ]
+                )
+            else:
+                own = _millimetres(figures.get(part, {}).get("own", {}))
+                shown = "; ".join(f"{key.replace('_', ' ')} {value:.3g}" for key, value in own.items())
+                rows.append([f"{name}: {part}", shown or "-", *["no truth" if shown else "-"] * 5])
+    return markdown(
+        ["to the true surface, in the face", "median", "90 %", "95 %", "median after ICP", "90 %", "95 %"], rows
+    )
+
+
+def _textures(results: dict) -> str:
+    rows = []
+    for name, figures in results.items():
+        alone = figures.get("texture", {}).get("alone", {})
+        for row, label in (*ROWS.items(), ("leave_one_out", "aligned, frame left out")):
+            f = alone.get(row)
+            if f and "not_run" in f:
+                rows.append([f"{name}: {label}", f"not run: {f['not_run']}", *["-"] * 6])
+            elif f:
+                rows.append(
+                    [
+                        f"{name}: {label}",
+                        number(f.get("psnr_after_gain" if row == "delit" else "psnr"), 2, " dB"),
+                        *(
+                            number(f.get(k), 3)
+                            for k in ("ssim", "detail", "mole_contrast", "pore_contrast", "pore_correlation")
+                        ),
+                        number(f.get("seconds"), 0, " s"),
+                    ]
+                )
+    return markdown(
+        [
+            "texture of the true albedo frames",
+            "PSNR",
+            "SSIM",
+            "detail",
+            "moles: contrast",
+            "pores: contrast",
+            "pores: correlation",
+            "seconds",
+        ],
+        rows,
+    )
+
+
+def _costs(results: dict) -> str:
+    names = list(dict.fromkeys(stage for figures in results.values() for stage in figures.get("stages", {})))
+    rows = [
+        [
+            stage,
+            *(
+                f"{c['seconds']:.0f} s, {c['peak_mb'] / 1000:.1f} GB"
+                if (c := figures.get("stages", {}).get(stage))
+                else "-"
+                for figures in results.values()
+            ),
+        ]
+        for stage in names
+    ]
+    return markdown(["stage: seconds, peak memory", *results], rows)

@@ -1,0 +1,166 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How surely glasses are told: on rendered people whom nothing was learnt from, with and without drawn glasses, and the
+false alarms on real people without.
+
+    python -m research.benchmarks.head.glasses [DATA] [--work FOLDER] [--hdri FOLDER] [--json PATH] [--sheet PATH]
+
+DATA: the folder with photographs/, portraits/, faceolat/, near_ps_human1/, bust/ and lps_sun/, all without glasses;
+each of them is a capture, or several. FOLDER holds the figures' sights as `research.training glasses` keeps them. PATH
+of
+--sheet: a picture of rendered people, nobody real, with how sure each is.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+from skimage.data import astronaut
+
+from core.capture.messages import Problem, Reporter
+from core.face import faces
+from core.face.glasses import sureness
+from core.imaging import images
+from core.stages.frames.glasses import LIKELY_LOG_ODDS, judge
+
+from ...people.environments import read_panoramas
+from ...people.lifelike import glasses
+from ...training import glasses as training
+from .. import figures
+from ..captures.films import read_film
+
+SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
+COMMAND = "python -m research.benchmarks.head.glasses DATA --hdri DATA/hdri --json research/records/glasses.json"
+BARE, SEEN = 3, 4
+"""Captures without glasses of each held-out figure, beside one with each kind of them; photographs of a capture."""
+ACROSS = 8  # pictures in a row of the sheet
+FILMED = 12
+"""Frames of a film that are looked at."""
+LONG_SIDE = 960
+
+
+def verdict(probabilities: list[float]) -> str:
+    """refused, warned or passed: what the stage frames does with a capture whose frames are so sure of glasses."""
+    report = Reporter("frames")
+    try:
+        judge(probabilities, False, report)
+    except Problem:
+        return "refused"
+    return "warned" if report.findings else "passed"
+
+
+def look(srgb: np.ndarray) -> float:
+    """How surely a picture shows glasses; nan where no face is found or it is turned too far."""
+    share = min(1.0, LONG_SIDE / max(srgb.shape[:2]))
+    srgb = images.resize(srgb, round(srgb.shape[1] * share), round(srgb.shape[0] * share)) if share < 1 else srgb
+    face = faces.detect(srgb)
+    return sureness(srgb, face) if face else float("nan")
+
+
+def rendered(work: Path, hdri: Path | None) -> tuple[dict, list]:
+    """Captures of the held-out figures, each all their views: what becomes of them, and single pictures, by kind. And
+    some pictures to look at."""
+    people, panoramas = training.seeds(0)[1], read_panoramas(hdri)
+    training.prepare(people, work, Reporter("glasses"))
+    told: dict[str, list] = {kind: [] for kind in (*glasses.KINDS, "none")}
+    shown = []
+    for person in people:
+        for number, kind in enumerate((*glasses.KINDS, *["none"] * BARE)):
+            rng = np.random.default_rng([3, person, number])
+            sights = [training.read(work, person, view) for view in range(SEEN)]
+            pair = None if kind == "none" else glasses.sample_glasses(sights[0].landmarks, rng, kind)
+            pictures = [training.photograph_sight(sight, pair, rng, panoramas) for sight in sights]
+            told[kind].append([look(picture) for picture in pictures])
+            shown.append((pictures[number % len(pictures)], told[kind][-1][number % len(pictures)]))
+    return {kind: counted(captures) for kind, captures in told.items()}, shown
+
+
+def counted(captures: list[list[float]]) -> dict:
+    """Of captures and of their single pictures: what becomes of them."""
+    single = np.array([each for capture in captures for each in capture if np.isfinite(each)])
+    ends = [verdict(capture) for capture in captures]
+    return {
+        "captures": len(captures),
+        **{end: ends.count(end) for end in ("refused", "warned", "passed")},
+        "pictures": len(single),
+        "likely_percent": round(100 * float((single > LIKELY_LOG_ODDS).mean()), 1) if len(single) else None,
+        "surest": round(float(single.max()), 1) if len(single) else None,
+    }
+
+
+def real(data: Path) -> dict[str, list[list[np.ndarray]]]:
+    """Captures of real people without glasses by set, each a list of sRGB pictures."""
+    lamps = [
+        images.read_srgb(path)
+        for path in sorted((data / "near_ps_human1").glob("*.png"))
+        if path.stem[0] == "0" or path.stem == "ambient"
+    ]
+    return {
+        "photographs": [list(read(data / "photographs", "*.jpg"))],
+        "portraits": [[picture] for picture in read(data / "portraits", "*.png")],
+        "faceolat": [list(read(data / "faceolat" / "align_image" / person, "**/*.png")) for person in ("049", "071")],
+        "near_ps_human1": [[np.clip(gain * lamp, 0, 1) for lamp in lamps] for gain in (6, 15)],
+        "bust": [list(read(data / "bust", "*.jpg"))],
+        "lps_sun": [filmed(data / "lps_sun" / "capture.mp4")],
+        "scikit-image": [[astronaut().astype(np.float32) / 255]],
+    }
+
+
+def read(folder: Path, pattern: str) -> Iterator[np.ndarray]:
+    yield from (images.read_srgb(path) for path in sorted(folder.glob(pattern)))
+
+
+def filmed(video: Path) -> list[np.ndarray]:
+    """FILMED frames of a film, evenly spread."""
+    frames = list(read_film(video))
+    return [frames[k].astype(np.float32) / 255 for k in np.linspace(0, len(frames) - 1, FILMED).astype(int)]
+
+
+def sheet(judged_pictures: list) -> np.ndarray:
+    rows = []
+    for picture, sure in judged_pictures:
+        tile = cv2.resize(picture, (180, 180), interpolation=cv2.INTER_AREA)
+        cv2.putText(
+            tile,
+            f"{sure:.1f}",
+            (6, 20),
+            cv2.FONT_HERSHEY_SIMPLEX,
+            0.55,
+            (1.0, 1.0, 0.2) if sure > LIKELY_LOG_ODDS else (0.4, 1.0, 1.0),
+            2,
+        )
+        rows.append(tile)
+    rows += [np.zeros_like(rows[0])] * (-len(rows) % ACROSS)
+    return np.vstack([np.hstack(rows[k : k + ACROSS]) for k in range(0, len(rows), ACROSS)])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", type=Path, nargs="?", default=SHARED)
+    parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_glasses")
+    parser.add_argument("--hdri", type=Path)
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--sheet", type=Path)
+    asked = parser.parse_args()
+    record = {
+        "real": {
+            name: counted([[look(picture) for picture in capture] for capture in captures])
+            for name, captures in real(asked.data).items()
+        }
+    }
+    record["rendered"], shown = rendered(asked.work, asked.hdri)
+    print(json.dumps(record, indent=1))
+    if asked.json:
+        figures.write_record(asked.json, "glasses", COMMAND, record)
+    if asked.sheet:
+        images.write_srgb(asked.sheet, sheet(shown))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,198 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How well the face parser (core/face/parser.py) tells the parts of people that no training sees.
+
+    python -m research.benchmarks.head.parts [--json OUT.json] [--frames FOLDER] [--weights FILE] python -m
+        research.benchmarks.head.parts --sheet OUT.jpg --pictures FOLDER_OR_FILE ... [--brighter 8] [--weights FILE]
+
+The four people of research/benchmarks/captures/likenesses.py, each photographed VIEWS times from random sides in lights
+made without panoramas (research/people/lifelike/unlit.py and snapshot.py: rays on the CPU, no Blender); with --frames
+also the frames that research/benchmarks/captures/likenesses.py filmed, FOLDER/NAME/parts and capture.mp4, which Cycles
+rendered. The face is found as in a capture, by the face nets; what is judged lies in the crop.
+
+A pixel is of the part that most of it shows; in the photographs the skin between the roots of hair is hair, in the
+filmed frames, whose truth knows single hairs only, a hair counts SPARSE times: figures have so much fewer hairs than
+people. Per part the intersection over union (null where the person has none), over all pixels together; beside the
+network what always says where parts usually are: the mean of the other people's. hair_as_skin: share of the hair of the
+head that is taken for skin; skin_as_hair: the reverse. The sheet of photographs is for looking only.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from core.face import faces, parser
+from core.face.parser_network import ParseNet
+from core.face.parts import PARTS, SIDE_PX, cut, inside, to_crop
+from core.imaging import images
+
+from ...people.lifelike import snapshot, unlit
+from ...people.lifelike.figure import PARTS as GROWN
+from ...people.lifelike.figure import make_figure
+from ...people.lifelike.truth import Scene
+from ..captures.films import read_film
+from ..captures.likenesses import LIKENESSES
+from ..figures import markdown, write_record
+
+VIEWS, SIZE, TEXELS = 8, 400, 1024
+SPARSE = 4.0
+HAIRS = ("brows", "beard", "hair")
+ENDINGS = (".png", ".jpg", ".jpeg")
+COLOURS = (
+    np.array(
+        [
+            [255, 190, 150],
+            [230, 0, 80],
+            [120, 60, 0],
+            [255, 150, 0],
+            [70, 70, 230],
+            [255, 255, 255],
+            [0, 160, 80],
+            [0, 0, 0],
+        ],
+        np.float32,
+    )
+    / 255
+)
+"""Of the parts in a sheet."""
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument("--json", type=Path)
+    asked.add_argument(
+        "--frames", type=Path, metavar="FOLDER", help="what research.benchmarks.captures.likenesses wrote"
+    )
+    asked.add_argument("--weights", type=Path, default=parser.WEIGHTS)
+    asked.add_argument("--sheet", type=Path, help="draw the parts of photographs instead")
+    asked.add_argument("--pictures", type=Path, nargs="+", default=[])
+    asked.add_argument("--brighter", type=float, default=1.0, help="of the sheet: a factor on the pictures' values")
+    asked = asked.parse_args()
+    network = parser.load(asked.weights.resolve())
+    if asked.sheet:
+        write_sheet(asked.sheet, asked.pictures, network, asked.brighter)
+        return
+    crops = {person.name: list(_crops(photographs(person.seed), network)) for person in LIKENESSES}
+    rows = {name: row(found, VIEWS) for name, found in crops.items()}
+    rows["all"] = row([crop for found in crops.values() for crop in found], VIEWS * len(crops))
+    usual = [(truth, usual_parts(crops, name), known) for name, found in crops.items() for truth, _, known in found]
+    rows["all, where parts usually are"] = row(usual, VIEWS * len(crops))
+    for person in LIKENESSES if asked.frames else ():
+        if (asked.frames / person.name / "parts").is_dir():
+            frames = list(filmed(asked.frames / person.name))
+            rows[f"{person.name}, filmed"] = row(list(_crops(frames, network)), len(frames))
+    lines = []
+    for name, r in rows.items():
+        shares = (*r["iou"].values(), r["hair_as_skin"], r["skin_as_hair"])
+        lines.append([name, f"{r['found']} of {r['pictures']}", *(None if v is None else f"{v:.2f}" for v in shares)])
+    print(markdown(["person", "found", *PARTS, "hair as skin", "skin as hair"], lines))
+    if asked.json:
+        write_record(
+            asked.json,
+            "parts",
+            "python -m research.benchmarks.head.parts" + (" --frames FOLDER" if asked.frames else ""),
+            {"rows": rows},
+            keep=True,
+        )
+
+
+def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """VIEWS sRGB pictures of a person and their shares, [S, S, 3] and [S, S, len(PARTS)]."""
+    figure = make_figure(seed, TEXELS)
+    scene = Scene(figure)
+    for view in range(VIEWS):
+        rng = np.random.default_rng([seed, 92, view])
+        yield snapshot.photograph(unlit.trace_unlit(scene, unlit.random_view(figure, rng, SIZE), rng), rng)
+
+
+def filmed(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """The frames with truth of a filmed person and their shares, each hair SPARSE times."""
+    names = sorted(path.stem for path in (folder / "parts" / "hair").glob("*.png"))
+    for number, frame in enumerate(read_film(folder / "capture.mp4")):
+        if f"{number:04d}" in names:
+            parts = np.stack([images.read_mask(folder / "parts" / part / f"{number:04d}.png") for part in GROWN], -1)
+            shares = unlit.true_shares(parts)
+            shares[..., [PARTS.index(name) for name in HAIRS]] *= SPARSE
+            yield frame.astype(np.float32) / 255, shares / shares.sum(-1, keepdims=True)
+
+
+def _crops(
+    pictures: Iterator[tuple[np.ndarray, np.ndarray]], network: ParseNet
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Of each picture in which a face is found: the true parts, the network's, and where the crop shows the picture;
+    [SIDE, SIDE] each."""
+    for srgb, shares in pictures:
+        face = faces.detect(srgb)
+        if face is not None:
+            parts = parser.parse(srgb, face.landmarks, network)
+            yield cut(shares, parts.move).argmax(-1), parts.crop.argmax(-1), inside(srgb.shape, parts.move) > 0.5
+
+
+def usual_parts(crops: dict[str, list], name: str) -> np.ndarray:
+    """The part that most pictures of the other people show at each pixel of the crop."""
+    others = np.stack([truth for other, found in crops.items() if other != name for truth, _, _ in found])
+    return np.stack([(others == k).sum(0) for k in range(len(PARTS))]).argmax(0)
+
+
+def row(crops: list[tuple[np.ndarray, np.ndarray, np.ndarray]], pictures: int) -> dict:
+    """The figures of some crops: (truth, found, known) each."""
+    counted = np.zeros((len(PARTS), len(PARTS)), int)
+    for truth, found, known in crops:
+        np.add.at(counted, (truth[known], found[known]), 1)
+    both = np.diag(counted)
+    either = counted.sum(0) + counted.sum(1) - both
+    skin, hair = PARTS.index("skin"), PARTS.index("hair")
+    return {
+        "pictures": pictures,
+        "found": len(crops),
+        "iou": {
+            name: float(both[k] / either[k]) if counted[k].sum() > 20 * len(crops) else None
+            for k, name in enumerate(PARTS)
+        },
+        "hair_as_skin": _share(counted[hair, skin], counted[hair].sum()),
+        "skin_as_hair": _share(counted[skin, hair], counted[skin].sum()),
+    }
+
+
+def _share(count: int, total: int) -> float | None:
+    return float(count / total) if total else None
+
+
+def write_sheet(out: Path, pictures: list[Path], network: ParseNet, brighter: float) -> None:
+    """Draws the crops of photographs, and beside each its parts: in colours, and laid over it.
+
+    Parameters
+    ----------
+    out : of the sheet
+    pictures : files, and folders of them
+    network : reads the parts
+    brighter : factor on the pictures' sRGB values
+    """
+    rows = []
+    for path in [
+        path
+        for each in pictures
+        for path in (sorted(each.iterdir()) if each.is_dir() else [each])
+        if path.suffix.lower() in ENDINGS
+    ]:
+        srgb = np.clip(images.read_srgb(path)[..., :3] * brighter, 0, 1)
+        face = faces.detect(srgb)
+        if face is None:
+            print(f"{path.name}: no face was found")
+            continue
+        crop = cut(srgb, to_crop(face.landmarks))
+        drawn = (parser.parse(srgb, face.landmarks, network).crop @ COLOURS).astype(np.float32)
+        rows.append(np.hstack([crop, drawn, 0.55 * crop + 0.45 * drawn]))
+    rows += [np.zeros((SIDE_PX, 3 * SIDE_PX, 3), np.float32)] * (-len(rows) % 2)
+    sheet = np.vstack([np.hstack(pair) for pair in zip(rows[0::2], rows[1::2], strict=True)])
+    images.write_srgb(out, sheet)
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    main()

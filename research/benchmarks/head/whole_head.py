@@ -1,0 +1,256 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The completed head and the hair's masks, in numbers.
+
+    python -m research.benchmarks.head.whole_head [--seeds 9101 9102 ...] [--size 512] [--json OUT.json] [CAPTURE ...]
+
+Synthetic subjects (truth known everywhere, only the face seen), mean over the seeds, as {"fill", "completed"}; `fill`
+is what the solver gives where nobody looked, its mean face in the subject's tone:
+  neck, ears, scalp   mean error of the hidden albedo's tone (over 2 mm), sRGB of 255
+  grain               deviation of log albedo between 0.5 and 1 mm, hidden neck over face; 1 is alike
+  brows, beard        correlation of the mask with what the painted hair takes from the albedo
+  bare_chin           cm^2 of beard found where there is none
+  below_hair          error of the albedo under brows and beard against the skin painted without hair, sRGB of 255:
+                      {"with hair", "clean"}
+Captures: border, the mean step of the log tone from 8 mm inside the seen part to 6 mm outside, {"fill", "completed",
+"within"}, the last between places as far apart inside; with --subject SEED (the captures are of that synthetic person)
+tone, the errors as above where nobody looked; cut, the step over the map's own cut beside that of neighbours; hair,
+cm^2.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from scipy.spatial import cKDTree
+
+from core.capture.capture import Capture
+from core.capture.messages import Reporter
+from core.face import template
+from core.face.head import read_head
+from core.imaging import images
+from core.solver.start import tint_face
+from core.stages.solve.prior_files import load
+from core.stages.upscale import grain, hair
+from core.stages.upscale.maps import HeadMaps, read_maps
+from core.stages.upscale.surface import HeadSurface, lay_out
+from core.stages.upscale.whole_head import UNSEEN_CONFIDENCE, complete
+
+from ...people.parameters import sample_parameters
+from ...people.skin import make_skin
+from ..figures import write_record
+
+SEEDS = [9101, 9102, 9103, 9104, 9105, 9106]
+RINGS = (8.0, 11.0), (-6.0, -3.0), (22.0, 25.0)
+"""mm inside the border: the seen side, the unseen side, and farther in."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        prog="python -m research.benchmarks.head.whole_head", description=__doc__.splitlines()[0]
+    )
+    parser.add_argument("captures", nargs="*", type=Path)
+    parser.add_argument("--seeds", nargs="*", type=int, default=SEEDS)
+    parser.add_argument("--subject", type=int)
+    parser.add_argument("--size", type=int, default=512)
+    parser.add_argument(
+        "--json",
+        type=Path,
+        help="where the figures go, such as research/records/whole_head.json; those of other captures stay",
+    )
+    asked = parser.parse_args()
+    found = {}
+    if asked.seeds:
+        surface = lay_out(template.load(), asked.size)
+        rows = [{**whole(seed, surface), **hairs(seed, surface)} for seed in asked.seeds]
+        found["synthetic"] = {name: _mean([row[name] for row in rows]) for name in rows[0]}
+    for path in asked.captures:
+        found[path.stem] = of_capture(Capture(path), asked.subject)
+    print(json.dumps(found, indent=1))
+    if asked.json:
+        write_record(
+            asked.json,
+            "whole_head",
+            "python -m research.benchmarks.head.whole_head [--subject SEED] [CAPTURE]",
+            found,
+            keep=True,
+        )
+
+
+def whole(seed: int, surface: HeadSurface) -> dict:
+    """How near the hidden head comes to its truth."""
+    size = surface.size
+    truth, face = _painted(surface, seed), template.mask("face", size)
+    skin = torch.from_numpy(np.ascontiguousarray(template.mask("skin", size)))
+    tone = torch.from_numpy((truth.diffuse * skin.numpy()[..., None]).sum((0, 1)) / float(skin.sum())).float()
+    mean = tint_face(load().mean_face, tone, skin)[0].numpy().transpose(1, 2, 0)
+    shown = np.clip(2 * face, 0, 1)[..., None]
+    diffuse = truth.diffuse * shown + (mean[..., :3] + 1) / 2 * (1 - shown)
+    specular = truth.specular * shown[..., 0] + (mean[..., 6] + 1) / 2 * (1 - shown[..., 0])
+    cut = replace(
+        truth,
+        confidence=(0.7 * face).astype(np.float32),
+        seen=face.astype(np.float32),
+        diffuse=diffuse.astype(np.float32),
+        specular=specular.astype(np.float32),
+    )
+    done, hidden = complete(cut, surface, Reporter("upscale"), seed), face < 0.02
+    row: dict = {}
+    for region in ("neck", "ears", "scalp"):
+        where = hidden & (template.mask(region, size) > 0.9)
+        row[region] = {
+            name: _error(*(_tone(m, surface) for m in (maps, truth)), where)
+            for name, maps in (("fill", cut), ("completed", done))
+        }
+    near = hidden & (template.mask("neck", size) > 0.9) & (surface.texel < 1.5 * np.median(surface.texel))
+    row["grain"] = {
+        name: _grain(maps, near, surface) / _grain(truth, skin.numpy() > 0.99, surface)
+        for name, maps in (("fill", cut), ("completed", done))
+    }
+    return row
+
+
+def hairs(seed: int, surface: HeadSurface) -> dict:
+    """How well hair is found and taken away; the subject three times: bearded, shaven, without brows."""
+    bearded, shaven, bare = (
+        _painted(surface, seed, **changes)
+        for changes in ({"beard": 0.8, "beard_length": 1.0}, {"beard": 0.0}, {"beard": 0.0, "brow_density": 0.0})
+    )
+    found, none = hair.find(bearded, surface), hair.find(shaven, surface)
+    cleaned, _ = hair.clean(bearded, found, surface)
+    under = (_darker(bearded, bare) > 0.05) & (template.mask("scalp", surface.size) < 0.01)
+    return {
+        "brows": _alike(none.brows, _darker(shaven, bare)),
+        "beard": _alike(found.beard, _darker(bearded, shaven)),
+        "bare_chin": _cm2(none.beard, surface),
+        "below_hair": {
+            "with hair": _error(bearded.diffuse, bare.diffuse, under),
+            "clean": _error(cleaned, bare.diffuse, under),
+        },
+    }
+
+
+def of_capture(capture: Capture, subject: int | None = None) -> dict:
+    """How far the border and the map's cut show, before and after, and how much hair there is."""
+    maps = read_maps(capture.maps, capture.texture_confidence)
+    surface = lay_out(read_head(capture).mesh, len(maps.diffuse))
+    report = Reporter("upscale")
+    done = complete(maps, surface, report)
+    seen = cv2.morphologyEx(
+        (maps.seen >= UNSEEN_CONFIDENCE).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8)
+    )
+    seen = seen.astype(bool) | (template.mask("face", surface.size) > 0.5)
+    inside = (_distance(seen) - _distance(~seen)) * surface.texel
+    rings = [(inside > low) & (inside < high) for low, high in RINGS]
+    found = hair.find(done, surface)
+    tones = {}
+    if subject is not None:
+        truth, hidden = _painted(surface, subject), maps.confidence < 0.02
+
+        def error(maps, region: str):
+            where = hidden & (template.mask(region, surface.size) > 0.9)
+            return _error(*(_tone(m, surface) for m in (maps, truth)), where)
+
+        tones = {
+            "tone": {
+                region: {"fill": error(maps, region), "completed": error(done, region)}
+                for region in ("neck", "ears", "scalp")
+            }
+        }
+    return {
+        **tones,
+        "completed_share_percent": report.figures["completed_share_percent"],
+        "border": {
+            "fill": _step(maps, rings[0], rings[1], surface),
+            "completed": _step(done, rings[0], rings[1], surface),
+            "within": _step(maps, rings[0], rings[2], surface),
+        },
+        "cut": {"fill": _cut(maps, surface), "completed": _cut(done, surface)},
+        "hair": {name: round(_cm2(getattr(found, name), surface), 2) for name in ("brows", "lashes", "beard")},
+    }
+
+
+def _painted(surface: HeadSurface, seed: int, **changes) -> HeadMaps:
+    skin = make_skin(replace(sample_parameters(seed), **changes), surface.size)
+    one = np.ones((surface.size,) * 2, np.float32)
+    return HeadMaps(
+        skin.diffuse.astype(np.float32),
+        skin.normal.astype(np.float32),
+        skin.specular,
+        0.7 * one,
+        np.repeat(one[..., None], 3, 2),
+        one,
+    )
+
+
+def _step(maps: HeadMaps, ring: np.ndarray, next_ring: np.ndarray, surface: HeadSurface) -> float:
+    """Mean difference of the log tone (over 2 mm) between the texels of a ring and the nearest of another on the
+    surface."""
+    tone = np.log(_tone(maps, surface))
+    _, nearest = cKDTree(surface.position[ring][::4]).query(surface.position[next_ring][::4], distance_upper_bound=25.0)
+    met = nearest < len(surface.position[ring][::4])
+    return float(np.abs(tone[next_ring][::4][met] - tone[ring][::4][nearest[met]]).mean())
+
+
+def _tone(maps: HeadMaps, surface: HeadSurface) -> np.ndarray:
+    return np.exp(
+        cv2.GaussianBlur(np.log(np.maximum(maps.diffuse, 0.004)), (0, 0), 2.0 / float(np.median(surface.texel)))
+    )
+
+
+def _cut(maps: HeadMaps, surface: HeadSurface) -> dict:
+    """Mean step of log albedo over the map's cut (less than 1 mm apart in space, far apart in the map), and between
+    neighbours along its edge."""
+    edge = np.zeros(surface.covered.shape, bool)
+    edge[[0, -1]] = edge[:, [0, -1]] = True
+    light, at, place = np.log(np.maximum(maps.diffuse, 0.004)).mean(2), np.argwhere(edge), surface.position[edge]
+    pairs = cKDTree(place).query_pairs(1.0, output_type="ndarray")
+    away = np.abs(at[pairs[:, 0]] - at[pairs[:, 1]]).max(1)
+    step = np.abs(light[tuple(at[pairs[:, 0]].T)] - light[tuple(at[pairs[:, 1]].T)])
+    return {"across": float(step[away > 50].mean()), "beside": float(step[away < 3].mean())}
+
+
+def _grain(maps: HeadMaps, mask: np.ndarray, surface: HeadSurface) -> float:
+    fine = grain.bands(
+        np.log(np.maximum(maps.diffuse, 0.004)), np.ones(mask.shape, np.float32), float(np.median(surface.texel))
+    )[2]
+    return float(np.subtract(*np.percentile(fine[mask], [83, 17])))
+
+
+def _error(albedo: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> float:
+    return float(255 * np.abs(images.linear_to_srgb(albedo[mask]) - images.linear_to_srgb(truth[mask])).mean())
+
+
+def _darker(hairy: HeadMaps, bare: HeadMaps) -> np.ndarray:
+    return np.clip(np.log(np.maximum(bare.diffuse, 0.004)) - np.log(np.maximum(hairy.diffuse, 0.004)), 0, None).mean(2)
+
+
+def _alike(cover: np.ndarray, true: np.ndarray) -> float:
+    """0 where nothing was found."""
+    face = template.mask("face", len(cover)) > 0.5
+    return float(np.corrcoef(cover[face], true[face])[0, 1]) if cover[face].std() > 0 else 0.0
+
+
+def _cm2(cover: np.ndarray, surface: HeadSurface) -> float:
+    return float((cover * surface.texel**2).sum()) / 100
+
+
+def _distance(inside: np.ndarray) -> np.ndarray:
+    padded = np.pad(inside, 1, mode="edge").astype(np.uint8)
+    return np.minimum(cv2.distanceTransform(padded, cv2.DIST_L2, 5)[1:-1, 1:-1], 1e4)
+
+
+def _mean(scores: list):
+    if isinstance(scores[0], dict):
+        return {name: _mean([value[name] for value in scores]) for name in scores[0]}
+    return round(float(np.mean(scores)), 3)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,3 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Benchmarks of light and of heads in other light."""

@@ -1,0 +1,315 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Solved heads under new light beside the true subjects under the same light: the number that artists feel.
+
+    python -m research.benchmarks.light.relit WORK [--sample CAPTURE] [--people FOLDER [--only NAME ...]] [--picture
+    docs/pictures/relit.jpg] [--json OUT.json]
+
+CAPTURE was solved from research/people/sample, FOLDER was made by research/benchmarks/captures/people.py. Rendered by
+Cycles with the add-on's own material and lights, of which none lit a capture, as linear EXR; both heads are the
+registered one. A picture is exposed so that the true subject's face has the mean luminance MIDDLE (one gain per light,
+the same for all rows), encoded by the sRGB curve and clipped: no AgX. Figures are of the face, each the mean over the
+lights:
+
+    raw, delit                   the filmed or the delit texture for albedo
+    solved                       all three maps as delivered
+    no_relief, even_gloss        solved without the one, with the other; plain: both
+    true_albedo, true_normal, true_specular    solved, with one map swapped for the true one: what that map costs
+    floor                        the truth with other random numbers: what the rendering's noise costs
+
+The true maps are worn where the registered surface lies on the true head (research/benchmarks/light/relit_maps.py). All
+albedos share the truth's mean over confident facial skin. WORK keeps the renders; those that are newer than the maps
+and textures are taken as they are."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from core.capture.capture import Capture
+from core.capture.files import write_json
+from core.imaging import images
+
+from ...people import sample
+from ...people.identities import subject_mesh
+from ...people.parameters import sample_parameters
+from ...people.pigment import LUMINANCE
+from ...people.skin import make_skin
+from .. import figures
+from ..captures.people import PEOPLE, write_maps
+from ..head.head_against_truth import pose_of_truth
+from ..measures.pictures import differences, face_box
+from .relit_maps import Worn, face_mask, read_rows, read_worn, worn_by, write_row
+from .relit_renders import MARGIN
+
+LIGHTS = ("three_point", "window", "sun", "coloured", "city.exr", "interior.exr")
+ROWS = (
+    "raw",
+    "delit",
+    "solved",
+    "plain",
+    "no_relief",
+    "even_gloss",
+    "true_albedo",
+    "true_normal",
+    "true_specular",
+    "floor",
+)
+LABELS = {
+    "raw": "filmed texture as albedo",
+    "delit": "delit texture as albedo",
+    "solved": "**solved**",
+    "plain": "solved albedo, no relief, even gloss",
+    "no_relief": "solved, no relief",
+    "even_gloss": "solved, even gloss",
+    "true_albedo": "solved, with the true albedo",
+    "true_normal": "solved, with the true normals",
+    "true_specular": "solved, with the true specular albedo",
+    "floor": "the truth, other random numbers",
+}
+SHOWN = ("truth", "solved", "delit", "raw")
+RESOLUTION, SAMPLES = 320, 16
+MIDDLE = 0.18
+OVER_RAW, OVER_DELIT = 1.0, 0.5  # dB that are asked for
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("work", type=Path)
+    parser.add_argument("--sample", type=Path)
+    parser.add_argument("--people", type=Path)
+    parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
+    parser.add_argument(
+        "--picture", type=Path, help="a JPEG of the first subject under all lights: truth, solved, delit, raw"
+    )
+    parser.add_argument("--json", type=Path, help="where the table's figures go, such as research/records/relit.json")
+    parser.add_argument("--lights", nargs="+", default=LIGHTS)
+    parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS)
+    arguments = parser.parse_args()
+    work, results = arguments.work.resolve(), {}
+    for subject in _subjects(arguments, work):
+        name = subject.name
+        render_rows(subject, work / name, arguments.lights, arguments.rows)
+        results[name] = score(work / name, arguments.lights, arguments.rows)
+        write_json(work / f"{name}.json", results[name])
+        print(f"{name}: {shortfall(mean_over_lights(results[name])) or 'as asked'}", file=sys.stderr)
+    if arguments.picture and results:
+        images.write_srgb(
+            arguments.picture,
+            side_by_side(
+                [images.read_srgb(work / next(iter(results)) / f"{Path(light).stem}.png") for light in arguments.lights]
+            ),
+            quality=86,
+        )
+    means = {name: mean_over_lights(found) for name, found in results.items()}
+    print(table(means))
+    if arguments.json:
+        source = (
+            "--sample .demo/sample.wildcap"
+            if arguments.sample
+            else f"--people FOLDER --rows {' '.join(arguments.rows)}"
+        )
+        figures.write_record(
+            arguments.json, "relit", f"python -m research.benchmarks.light.relit WORK {source}", with_mean(means)
+        )
+    return 0
+
+
+@dataclass(frozen=True)
+class RelitSubject:
+    """name; capture, solved; maps: the folder of the true ones; truth: where cameras.json lies; seed: whose head it
+    is."""
+
+    name: str
+    capture: Capture
+    maps: Path
+    truth: Path
+    seed: int
+
+    def worn(self) -> Worn:
+        """The true maps on the capture's head."""
+        head = subject_mesh(self.seed)
+        pose, *_ = pose_of_truth(self.capture, self.truth)
+        return worn_by(self.capture, read_worn(self.maps), head.moved(pose.apply(head.vertices)))
+
+
+def _subjects(arguments: argparse.Namespace, work: Path) -> Iterator[RelitSubject]:
+    """Each subject that was asked for and has been solved."""
+    if arguments.sample:
+        maps = work / "sample_truth"
+        if not (maps / "normal.png").exists():  # written last
+            write_maps(maps, make_skin(sample_parameters(sample.RESERVED["sample"]), sample.MAPS))
+        truth = Path(sample.__file__).parent / "sample"
+        yield RelitSubject("sample", Capture(arguments.sample.resolve()), maps, truth, sample.RESERVED["sample"])
+    for person in (p for p in PEOPLE if arguments.people and p.name in arguments.only):
+        capture = Capture(arguments.people.resolve() / f"{person.name}.wildcap")
+        if (capture.maps / "normal.png").is_file():
+            truth = arguments.people.resolve() / person.name
+            yield RelitSubject(person.name, capture, truth / "maps", truth, person.seed)
+        else:
+            print(f"{person.name} has not been solved and is left out.", file=sys.stderr)
+
+
+def render_rows(subject: RelitSubject, work: Path, lights: list[str], row_names: list[str]) -> None:
+    """Renders the pictures that are not newer than what they show.
+
+    Parameters
+    ----------
+    subject : with maps of its own and the true ones
+    work : takes renders/ROW_LIGHT.exr and face.exr
+    lights : presets, and pictures of surroundings
+    row_names : of the rows, besides the truth
+    """
+    capture, truth = subject.capture, subject.maps
+    renders, mask = work / "renders", work / "mask.png"
+    renders.mkdir(parents=True, exist_ok=True)
+    pictures = [
+        renders / name
+        for name in (
+            *(f"{row}_{Path(light).stem}.exr" for row in ("truth", *row_names) for light in lights),
+            "face.exr",
+        )
+    ]
+    old = [picture for picture in pictures if not is_newer(picture, capture, truth)]
+    if not old:
+        return
+    for picture in old:  # what is there would be kept
+        picture.unlink(missing_ok=True)
+    face_mask(mask)
+    rows = []
+    for name, worn in read_rows(capture, subject.worn()).items():
+        if name not in ("truth", *row_names):
+            continue
+        folder = work / f"{name}.wildcap"
+        write_row(folder, capture, worn)
+        rows.append({"name": name, "capture": str(folder), "seed": int(name == "floor")})
+    write_json(
+        work / "job.json",
+        {
+            "rows": rows,
+            "lights": list(lights),
+            "out": str(renders),
+            "mask": str(mask),
+            "resolution": RESOLUTION,
+            "samples": SAMPLES,
+        },
+    )
+    subprocess.run(
+        [sys.executable, "-m", "research.benchmarks.light.relit_renders", str(work / "job.json")],
+        cwd=figures.ROOT,
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
+
+
+def is_newer(picture: Path, capture: Capture, truth: Path) -> bool:
+    """Whether a render is there and was made after all that it shows: the capture's maps, its textures and head, and
+    the true maps."""
+    shown = [
+        path for folder in (capture.maps, capture.maps_4k, truth) if folder.is_dir() for path in folder.glob("*.png")
+    ]
+    shown += [path for path in (capture.head, capture.texture, capture.texture_filmed) if path.is_file()]
+    return picture.is_file() and picture.stat().st_mtime >= max((path.stat().st_mtime for path in shown), default=0.0)
+
+
+def score(work: Path, lights: list[str], rows: list[str] = ROWS) -> dict[str, dict[str, dict]]:
+    """Light -> row -> PSNR, SSIM and FLIP over the face; and pictures of SHOWN side by side, work/LIGHT.png."""
+    face = images.read_data(work / "renders" / "face.exr")[..., 0] > 0.5
+    box, seen, found = face_box(face), rendered(face), {}
+    for light in lights:
+        linear = {
+            row: images.read_linear(work / "renders" / f"{row}_{Path(light).stem}.exr") for row in ("truth", *rows)
+        }
+        gain = exposure(linear["truth"], face)
+        shown = {row: images.linear_to_srgb(picture * gain) for row, picture in linear.items()}
+        images.write_srgb(
+            work / f"{Path(light).stem}.png", np.hstack([shown[row][seen] for row in SHOWN if row in shown])
+        )
+        found[light] = {row: differences(shown[row][box], shown["truth"][box], face[box]) for row in rows}
+    return found
+
+
+def exposure(truth: np.ndarray, face: np.ndarray) -> float:
+    """The gain that brings the mean luminance of a linear picture [H, W, 3] over the pixels `face` bool [H, W] to
+    MIDDLE."""
+    return MIDDLE / float((truth[face] @ LUMINANCE).mean())
+
+
+def rendered(face: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns of the rectangle about the face, bool [H, W], that is rendered
+    (research/benchmarks/light/relit_renders.py)."""
+    margin = int(MARGIN * len(face)) - 1
+    return tuple(
+        slice(max(side[0] - margin, 0), side[-1] + margin)
+        for side in (np.flatnonzero(face.any(axis)) for axis in (1, 0))
+    )
+
+
+def side_by_side(pictures: list[np.ndarray]) -> np.ndarray:
+    """Pictures of one size in two columns, sRGB [H, W, 3]; an odd one out is followed by black."""
+    half = (len(pictures) + 1) // 2
+    columns = pictures + [np.zeros_like(pictures[0])] * (2 * half - len(pictures))
+    return np.hstack([np.vstack(columns[:half]), np.vstack(columns[half:])])
+
+
+def mean_over_lights(figures_by_light: dict[str, dict[str, dict]]) -> dict[str, dict[str, float]]:
+    """Row -> figures, each the mean over the lights."""
+    rows = next(iter(figures_by_light.values()))
+    return {
+        row: {
+            figure: float(np.mean([figures_by_light[light][row][figure] for light in figures_by_light]))
+            for figure in rows[row]
+        }
+        for row in rows
+    }
+
+
+def shortfall(rows: dict[str, dict[str, float]]) -> str:
+    """What is missing to what is asked for, in words; empty where nothing is."""
+    gains = {row: rows["solved"]["psnr"] - rows[row]["psnr"] for row in ("raw", "delit")}
+    return ", ".join(
+        f"{gains[row]:+.2f} dB over {row} where {asked:.1f} is asked for"
+        for row, asked in (("raw", OVER_RAW), ("delit", OVER_DELIT))
+        if gains[row] < asked
+    )
+
+
+def with_mean(results: dict[str, dict[str, dict[str, float]]]) -> dict[str, dict[str, dict[str, float]]]:
+    """The same and, where there are several people of research/benchmarks/captures/people.py, their mean."""
+    people = [results[person.name] for person in PEOPLE if person.name in results]
+    if len(people) < 2:
+        return dict(results)
+    common = [row for row in ROWS if all(row in found for found in people)]
+    return {
+        **results,
+        "mean": mean_over_lights({str(k): {row: found[row] for row in common} for k, found in enumerate(people)}),
+    }
+
+
+def table(results: dict[str, dict[str, dict[str, float]]]) -> str:
+    """Markdown: a line per row, and for each subject PSNR, SSIM and FLIP; last the mean over the people of
+    research/benchmarks/captures/people.py."""
+    columns, people = with_mean(results), sum(person.name in results for person in PEOPLE)
+    return figures.markdown(
+        ["row", *(f"mean of {people}" if name == "mean" else name.replace("_", " ") for name in columns)],
+        [
+            [
+                LABELS[row],
+                *(f"{c[row]['psnr']:.2f} dB, {c[row]['ssim']:.3f}, {c[row]['flip']:.3f}" for c in columns.values()),
+            ]
+            for row in ROWS
+            if all(row in column for column in columns.values())
+        ],
+    )
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    sys.exit(main())

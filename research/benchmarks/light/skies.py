@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What environments are like, and how often a face's skin tells of them: the prior of core/light/sunlight.py.
+
+    python -m research.benchmarks.light.skies FOLDER
+
+FOLDER holds panoramas (.hdr, .exr), +Z up. Their sun or lamp is taken out as for portraits, for the fit has a sun of
+its own. Every panorama counts as if it were turned about the vertical by any angle.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from core.capture.messages import Problem
+from core.face import template
+from core.face.head import Head
+from core.light.spherical_harmonics import sh_basis
+from core.solver.extensions.split import TRAIT_REACH_M
+from core.stages.delight.surface import skin_weights
+
+from ...people.environments import panorama_directions, read_panoramas, solid_angles, without_lamp
+
+POINTS = 2500  # of the skin, drawn evenly
+PAIRS = ((1, 3), (4, 8), (5, 7))
+"""Harmonics that turn into each other about the vertical."""
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    panoramas = read_panoramas(parser.parse_args().folder)
+    if not panoramas:
+        raise Problem("The folder holds no panoramas.", "Name one with .hdr or .exr files.")
+    mean, deviation = summarise_skies(np.array([harmonic_shares(without_lamp(panorama)[0]) for panorama in panoramas]))
+    print(f"{len(panoramas)} panoramas, shares of the first coefficient")
+    print("mean     ", " ".join(f"{value:6.3f}" for value in mean))
+    print("deviation", " ".join(f"{value:6.3f}" for value in deviation))
+    mesh = template.load()
+    weights, _ = skin_weights(Head(mesh))
+    print(f"independent samples of bare facial skin: {count_independent(mesh.vertices, weights, TRAIT_REACH_M):.1f}")
+    return 0
+
+
+def harmonic_shares(panorama: np.ndarray) -> np.ndarray:
+    """Orthonormal coefficients [9] of a panorama's luminance [H, W, 3], as shares of the first."""
+    size = panorama.shape[:2]
+    coefficients = np.einsum("ijk,ij->k", sh_basis(panorama_directions(*size)), panorama.mean(-1) * solid_angles(*size))
+    return coefficients / coefficients[0]
+
+
+def summarise_skies(shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and standard deviation [9] of environments [N, 9] that may be turned about the vertical by any angle."""
+    mean, square = np.zeros(9), (shares**2).mean(0)
+    for pair in PAIRS:
+        square[list(pair)] = square[list(pair)].mean()
+    zonal = [0, 2, 6]
+    mean[zonal] = shares[:, zonal].mean(0)
+    return mean, np.sqrt(np.maximum(square - mean**2, 0))
+
+
+def count_independent(points: np.ndarray, weights: np.ndarray, reach: float) -> float:
+    """As how many independent samples points [V, 3] with weights [V] count whose values are correlated by
+    exp(-distance / reach)."""
+    known = np.flatnonzero(weights > 0)
+    known = known[:: max(1, len(known) // POINTS)]
+    points, weights = points[known], weights[known]
+    apart = np.linalg.norm(points[:, None] - points[None], axis=-1)
+    return float(weights.sum() ** 2 / (weights @ np.exp(-apart / reach) @ weights))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,325 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each part of the solver is worth, on UV-space problems with known truth
+(research/benchmarks/maps/uv_problems.py): subjects that no training saw.
+
+    python -m research.benchmarks.maps.ablation OUT.json [--rows NAME ...] [--subjects NAME ...] [--skins FOLDER]
+        [--kind raw|delit]
+                                  [--size 256] [--steps 20] [--jobs 2]
+    python -m research.benchmarks.maps.ablation OUT.json --table [--json research/records/ablation.json]
+    python -m research.benchmarks.maps.ablation OUT.json --picture docs/pictures/ablation.jpg
+
+Six subjects x three shadows for the rows that carry the method (KEY), the full method with two seeds, whose spread says
+what a tie is; the other rows run on one shadow per subject, the 600 steps of the paper and of the released code on one
+problem each; every row is compared with the full method on its own problems only. OUT.json keeps every finished solve,
+so the command goes on where it was stopped. --skins names a folder of skins carried into our UVs (`python -m
+research.training carry`); those in the prior's card under held_out_skins are added to the subjects. The picture is of
+synthetic subjects only."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
+from functools import lru_cache
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import torch
+from skimage.color import deltaE_ciede2000, rgb2lab
+
+from core.capture.capture import Capture
+from core.face.head import read_head
+from core.imaging import images
+from core.solver.lights import total_variation, update_lights
+from core.solver.objective import State, albedo, photometric_loss
+from core.solver.recipes import OURS, RECIPES, Recipe
+from core.solver.sampler import Sampler, seed_noise
+from core.solver.start import Start, start_solve
+from core.stages.solve import maps
+from core.stages.solve.capture_evidence import read_evidence
+from core.stages.solve.head_cells import make_head_cells
+from core.stages.solve.prior_files import WEIGHTS, load
+from core.stages.solve.skin_tone import GIVEN, SkinTone
+
+from .. import figures
+from .ablation_measures import measure_regions, summary, table
+from .uv_problems import LEE_PERRY_SMITH, SHADOWS, MaskedUvProblem, make_problem, skin_weight
+
+SUBJECTS = ("9000", "9002", "9004", "9007", "9008", LEE_PERRY_SMITH.name if LEE_PERRY_SMITH.is_dir() else "9001")
+FACE_CROP, CELLS = 768, 96
+FULL = "full method"
+KEY = (FULL, "without texel grid", "without prior", "grid on the whole face", "the texture itself")
+PICTURED = "without texel grid", "without prior", FULL
+
+# name: (what is changed in our recipe, cells of V across the face, what becomes of M, with the prior)
+ROWS: dict[str, tuple[dict, int, str, bool]] = {
+    FULL: ({}, CELLS, "painted", True),
+    "the texture itself": ({}, CELLS, "painted", False),
+    "without texel grid": ({}, CELLS, "empty", True),
+    "without prior": ({}, CELLS, "painted", False),
+    "grid on the whole face": ({}, CELLS, "full", True),
+    "grid reaches outside M": ({"open": 0.3}, CELLS, "painted", True),
+    "1 cell": ({}, 1, "painted", True),
+    "24 cells": ({}, 24, "painted", True),
+    "384 cells": ({}, 384, "painted", True),
+    "start at T": ({"start": 1.0}, CELLS, "painted", True),
+    "start from a uniform tone": ({"reference": "uniform"}, CELLS, "painted", True),
+    "start from the nearest skin": ({"reference": "nearest"}, CELLS, "painted", True),
+    "27 numbers per cell": ({"one_chroma": False}, CELLS, "painted", True),
+    "mask as painted, no edge fitted": ({"sharp_edges": False}, CELLS, "painted", True),
+    "moles not protected": ({"protect_marks": False}, CELLS, "painted", True),
+    "light explains features too": ({"trusting": True}, CELLS, "painted", True),
+    "local light not smooth": ({"smooth": 0.0}, CELLS, "painted", True),
+    "light as split from skin": ({"linear": math.inf}, CELLS, "painted", True),
+    "global light in closed form at first": ({"phases": (("grid", 0.0, 0.5),), "refit": 0.3}, CELLS, "painted", True),
+    "proximal guidance": ({"guidance": "proximal"}, CELLS, "painted", True),
+    "75 steps": ({"steps": 75}, CELLS, "painted", True),
+    "recipe paper": ({}, CELLS, "painted", True),
+    "recipe released": ({}, CELLS, "painted", True),
+}
+NAMED = {"recipe paper": "paper", "recipe released": "released"}
+TONES = (
+    (0.95, 0.80, 0.72),
+    (0.85, 0.67, 0.56),
+    (0.76, 0.57, 0.45),
+    (0.62, 0.43, 0.32),
+    (0.47, 0.31, 0.23),
+    (0.30, 0.20, 0.16),
+)
+"""sRGB, light to dark: asked for of one subject after the other, whatever its own is."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--rows", nargs="+", choices=tuple(ROWS), default=list(ROWS))
+    parser.add_argument("--subjects", nargs="+", default=list(SUBJECTS))
+    parser.add_argument("--skins", type=Path)
+    parser.add_argument("--kind", choices=("raw", "delit"), default="raw")
+    parser.add_argument("--size", type=int, default=256)
+    parser.add_argument("--steps", type=int, default=20, help="of every row that does not say otherwise")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--table", action="store_true", help="solve nothing, print what is there")
+    parser.add_argument(
+        "--json", type=Path, help="where the table's figures go, such as research/records/ablation.json"
+    )
+    parser.add_argument("--picture", type=Path, help="draw two subjects instead")
+    options = parser.parse_args()
+    done = json.loads(options.out.read_text(encoding="utf-8")) if options.out.is_file() else {}
+    if options.picture:
+        draw(options)
+        return
+    if not options.table:
+        solve_all(options, done)
+    found = summary({k: r for k, r in done.items() if "tone" not in r}, list(ROWS), FULL)
+    print(table(found) + "\n\nSpread over the solver's seeds, dB:", found["spread"])
+    differences = [r["tone"] for r in done.values() if "tone" in r]
+    if differences:
+        found["tone"] = {"delivered": max(a for a, _ in differences), "sampled": max(b for _, b in differences)}
+        print(
+            "Skin tone, largest CIEDE2000 of the solved mean to the request over six tones, as delivered and by the "
+            "sampling alone:",
+            found["tone"],
+        )
+    if options.json:
+        figures.write_record(options.json, "ablation", "python -m research.benchmarks.maps.ablation OUT.json", found)
+
+
+def solve_all(options: argparse.Namespace, done: dict) -> None:
+    """Fills `done` with the solves that are missing and stores it after each problem."""
+    subjects = [*options.subjects, *(_held_out(options.skins) if options.skins else [])]
+    tasks = []
+    for i, subject in enumerate(subjects):
+        for j, shadows in enumerate(SHADOWS):
+            wanted = [(row, seed) for row in options.rows for seed in (0, 1) if _belongs(row, i, j, seed)]
+            if j == i % 3 and i < len(TONES) and options.kind == "raw":
+                wanted.append((f"tone {i}", 0))
+            wanted = [(row, seed) for row, seed in wanted if _key(row, subject, shadows, options, seed) not in done]
+            if wanted:
+                tasks.append((subject, shadows, wanted))
+    with ProcessPoolExecutor(options.jobs, get_context("spawn")) as pool:
+        for future in as_completed([pool.submit(_solve_problem, *task, options) for task in tasks]):
+            if future.exception():
+                pool.shutdown(cancel_futures=True)
+            done.update(future.result())
+            temporary = options.out.with_name(f".{options.out.name}")
+            temporary.write_text(json.dumps(done, indent=0), encoding="utf-8")
+            os.replace(temporary, options.out)
+            print(f"{len(done)} solves", flush=True)
+
+
+def _belongs(row: str, subject: int, shadows: int, seed: int) -> bool:
+    """Whether a row is solved on a problem: key rows on all, others on one shadow per subject, the 600 steps on one
+    problem each; two seeds of the first."""
+    if seed and row != FULL:
+        return False
+    if row in NAMED:
+        return subject == shadows == 0
+    return row in KEY or shadows == subject % 3
+
+
+def _held_out(folder: Path) -> list[str]:
+    names = json.loads(WEIGHTS.with_suffix(".json").read_text(encoding="utf-8")).get("held_out_skins", [])
+    return [str(folder / f"{name}.png") for name in names]
+
+
+def _solve_problem(subject: str, shadows: str, solves: list[tuple[str, int]], options: argparse.Namespace) -> dict:
+    torch.set_num_threads(1)
+    given, found = make_problem(subject, shadows, options.size, options.kind), {}
+    for row, seed in solves:
+        began = time.monotonic()
+        about = {"row": row, "seed": seed, "problem": [Path(subject).stem, shadows, options.size, options.kind]}
+        if row.startswith("tone "):
+            about["tone"] = tone_error(given, TONES[int(row[5:])], options.steps)
+        else:
+            albedo = solve_row(given, row, seed, options.steps)
+            about |= {
+                "seconds": round(time.monotonic() - began, 1),
+                **measure_regions(albedo, given.albedo, given.face, given.regions()),
+            }
+        found[_key(row, subject, shadows, options, seed)] = about
+    return found
+
+
+def solve_row(uv_problem: MaskedUvProblem, row: str, seed: int, steps: int) -> np.ndarray:
+    """Solves a problem by one row's method, which is told the true skin tone.
+
+    Parameters
+    ----------
+    uv_problem : solved
+    row : a key of ROWS
+    seed : of the noise
+    steps : of every row that does not say otherwise
+
+    Returns
+    -------
+    The albedo, linear [S, S, 3].
+    """
+    if row == "the texture itself":
+        return uv_problem.texture
+    changes, cells, mask, with_prior = ROWS[row]
+    recipe = RECIPES[NAMED[row]] if row in NAMED else replace(OURS, **{"steps": steps, **changes})
+    return solve_problem(uv_problem, recipe, uv_problem.tone, seed, cells, mask, with_prior)
+
+
+def solve_problem(
+    uv_problem: MaskedUvProblem,
+    recipe: Recipe,
+    tone: SkinTone,
+    seed: int = 0,
+    cells: int = CELLS,
+    mask: str = "painted",
+    with_prior: bool = True,
+) -> np.ndarray:
+    """Solves a problem under a recipe and a requested tone.
+
+    Parameters
+    ----------
+    uv_problem : solved
+    recipe : of the solve
+    tone : of the skin
+    seed : of the noise
+    cells : of V across the face
+    mask : what becomes of M: "painted", "empty" or "full"
+    with_prior : False: the texels follow the loss alone
+
+    Returns
+    -------
+    The albedo, linear [S, S, 3].
+    """
+    size, prior = len(uv_problem.albedo), _prior()
+    with tempfile.TemporaryDirectory() as folder:
+        capture = Capture(folder)
+        replace(
+            uv_problem,
+            mask={"painted": uv_problem.mask, "empty": 0 * uv_problem.mask, "full": 0 * uv_problem.mask + 1}[mask],
+        ).write(capture)
+        evidence = read_evidence(capture, read_head(capture), size)
+    start = start_solve(prior, evidence, tone.tensor, FACE_CROP / cells, recipe, make_head_cells)
+    if with_prior:
+        sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(seed))
+        state = sampler.sample(start.observations, start.state)
+    else:
+        state = fit_texels(start, start.recipe)
+    return maps.finish_maps(state, evidence, start).diffuse
+
+
+def fit_texels(
+    start: Start,
+    recipe: Recipe,
+    updates: int = 600,
+    fit: Callable[..., None] = update_lights,
+    smooth: float = 0.0,
+) -> State:
+    """No prior: the albedo's texels and the lights follow the photometric loss alone, under Adam (the paper's
+    ablation).
+
+    Parameters
+    ----------
+    start : begun from; its state changes, and is returned
+    recipe : of the lights; its phases last as long as the fit
+    updates : of Adam
+    fit : moves the lights after each
+    smooth : weight of the albedo's L1 variation
+    """
+    recipe = replace(
+        recipe, phases=tuple((which, 0.0, 1.0) for which, _, _ in recipe.phases), refit=0.0, updates=updates
+    )
+    o, state = start.observations[1], start.state
+    x = state.denoised.clone().requires_grad_(True)
+    adam = torch.optim.Adam([x], lr=0.01)
+    scheduler = torch.optim.lr_scheduler.ExponentialLR(adam, 0.995)
+    for step in range(updates):
+        with torch.no_grad():
+            shading = o.shader.total(state.lights)
+        adam.zero_grad()
+        loss = photometric_loss(x, shading, o, o.weight, recipe.blur)
+        (loss + smooth * total_variation(albedo(x), o.weight) if smooth else loss).backward()
+        adam.step()
+        scheduler.step()
+        fit(state, x.detach(), o, recipe, step, updates)
+    state.denoised = x.detach()
+    return state
+
+
+def tone_error(uv_problem: MaskedUvProblem, tone: tuple[float, float, float], steps: int) -> tuple[float, float]:
+    """CIEDE2000 between a requested skin tone (sRGB) and the mean of the solved facial skin: as it is delivered, and
+    before the mean is brought to the request."""
+    skin, found, asked = skin_weight(len(uv_problem.albedo)), [], SkinTone.from_srgb(tone, GIVEN)
+    for rescale in (OURS.rescale, "none"):
+        albedo = solve_problem(uv_problem, replace(OURS, steps=steps, rescale=rescale), asked)
+        mean = images.linear_to_srgb((albedo * skin[..., None]).sum((0, 1)) / skin.sum())
+        found.append(round(float(deltaE_ciede2000(rgb2lab(mean), rgb2lab(np.array(tone)))), 3))
+    return found[0], found[1]
+
+
+def draw(options: argparse.Namespace) -> None:
+    """Of two synthetic subjects the texture, the rows PICTURED and the truth."""
+    lines = []
+    for subject, shadows in (("9007", "leaves, hard"), ("9008", "edge, half soft")):
+        given = make_problem(subject, shadows, options.size, options.kind)
+        solves = [solve_row(given, row, 0, options.steps) for row in PICTURED]
+        pictures = [given.texture * (given.albedo.mean() / given.texture.mean()), *solves]
+        lines.append(np.hstack([*pictures, given.albedo]))
+    images.write_srgb(options.picture, images.linear_to_srgb(np.clip(np.vstack(lines), 0, 1)))
+
+
+@lru_cache(maxsize=1)
+def _prior():
+    return load()
+
+
+def _key(row: str, subject: str, shadows: str, options: argparse.Namespace, seed: int) -> str:
+    return f"{row} | {Path(subject).stem} {shadows} {options.size} {options.kind} {options.steps} | seed {seed}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,261 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Albedo against truth, the paper's protocol for Digital Emily: our light beside other methods' light models, on delit
+and on raw frames.
+
+    python -m research.benchmarks.maps.comparison FOLDER [--only NAME ...] [--scan CAPTURE TRUTH] [--size 512] [--jobs
+        2] [--json OUT.json]
+
+FOLDER was made and solved by research/benchmarks/captures/people.py; CAPTURE is a solved one of another subject, TRUTH
+its folder. Rows of INPUT: METHOD over one texture:
+  wildcap                  the texel grid of local light in the shadow mask, by two seeds, whose spread is a tie
+  regions 5, regions 10    soft regions with a light each (light_models.py)
+  environment              one environment cubemap
+  environment, no prior    the same, and texels that follow the frames alone, smoothly
+  over its blur            the texture divided by its own blur, what one does by hand in Blender
+  texture                  taken for albedo as it is
+All but the last three sample the same prior with the same guidance; all are told the true skin tone. Raw rows get the
+mask that the chain proposes for raw frames. Maps are kept in FOLDER/comparison (research/benchmarks/maps/rerender.py
+reads them), so that a second run goes on where the first stopped."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
+from functools import cache, partial
+from multiprocessing import get_context
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+
+from core.capture.capture import Capture
+from core.capture.files import replacing_folder, write_json
+from core.face.head import read_head
+from core.imaging import images
+from core.settings.settings import Settings, from_json, preset
+from core.solver.evidence import Evidence
+from core.solver.sampler import Sampler, seed_noise
+from core.solver.start import Callbacks, start_solve
+from core.stages.solve import maps, recipe_of
+from core.stages.solve.capture_evidence import read_evidence
+from core.stages.solve.head_cells import make_head_cells
+from core.stages.solve.prior_files import load
+from core.stages.solve.skin_tone import read_given_tone
+from core.stages.solve.witnesses import confirm_marks
+
+from .. import figures
+from ..captures.continued import run_stages
+from ..captures.people import PEOPLE, skin_tone
+from . import light_models
+from .ablation import fit_texels
+from .albedo_score import looks, score_map
+from .comparison_table import INPUTS, OURS, means, paired_table, table
+
+SEEDS = {OURS: (0, 1)}
+LIGHTS: dict[str, Callable] = {
+    "regions 5": partial(light_models.light_by_regions, count=5),
+    "regions 10": partial(light_models.light_by_regions, count=10),
+    "environment": light_models.light_by_environment,
+    "environment, no prior": light_models.light_by_environment,
+}
+METHODS = (OURS, *LIGHTS, "over its blur", "texture")
+FREE = "environment, no prior"
+FREE_UPDATES, FREE_SMOOTH = 200, 0.01
+BLUR = 0.03  # deviation as a share of the map's side: keeps moles, takes a cheek's shading
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--only", nargs="*", default=[p.name for p in PEOPLE])
+    parser.add_argument("--scan", nargs=2, type=Path, metavar=("CAPTURE", "TRUTH"))
+    parser.add_argument("--size", type=int, default=512)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--json", type=Path)
+    asked = parser.parse_args()
+    folder = asked.folder.resolve()
+    subjects = {name: (folder / f"{name}.wildcap", folder / name) for name in asked.only}
+    if asked.scan:
+        subjects["scan"] = tuple(path.resolve() for path in asked.scan)
+    found = {}
+    with ProcessPoolExecutor(asked.jobs, get_context("spawn")) as pool:
+        running = {
+            pool.submit(compare_methods, *paths, folder / "comparison" / name, asked.size): name
+            for name, paths in subjects.items()
+        }
+        for future in as_completed(running):
+            found[running[future]] = future.result()
+            print(f"{running[future]} compared", flush=True)
+    found = {"size": asked.size, "subjects": {name: found[name] for name in subjects}}
+    found |= (
+        {"people": means([rows for name, rows in found["subjects"].items() if name != "scan"])}
+        if set(found["subjects"]) - {"scan"}
+        else {}
+    )
+    found |= {"scan": means([found["subjects"]["scan"]])} if "scan" in subjects else {}
+    if asked.json:
+        figures.write_record(
+            asked.json, "comparison", "python -m research.benchmarks.maps.comparison FOLDER --scan CAPTURE TRUTH", found
+        )
+    print(f"{table(found)}\n\n{paired_table(found['subjects'])}")
+
+
+def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[str, dict]:
+    """Scores all methods on one subject.
+
+    Parameters
+    ----------
+    source : a capture with texture and mask
+    truth : folder of the true albedo, and of the tone that all are given
+    work : takes each row's maps and scores; what is there is not solved again
+    size : of the maps, texels along a side
+
+    Returns
+    -------
+    Input -> method -> seed -> figures.
+    """
+    torch.set_num_threads(1)
+    found: dict[str, dict] = {given: {} for given in INPUTS}
+    for given in INPUTS:
+        settings = from_json(
+            {
+                "solve": {"skin_tone": skin_tone(truth), "size": size},
+                "delight": {"delighter": "none"} if given == "raw" else {},
+            },
+            preset("standard"),
+        )
+        capture = Capture(source) if given == "delit" else _raw(Capture(source), work / "raw.wildcap", settings)
+        seen = None
+        for method in METHODS:
+            for seed in SEEDS.get(method, (0,)) if given == "delit" else (0,):
+                row = find_row_folder(work, given, method, seed)
+                if not (row / "score.json").is_file():
+                    seen = seen or looks(capture, truth)[0]
+                    _keep(row, *solve_by_method(capture, settings, method, seed), seen)
+                score = json.loads((row / "score.json").read_text(encoding="utf-8"))
+                found[given].setdefault(method, {})[str(seed)] = score
+    return found
+
+
+def find_row_folder(work: Path, input_name: str, method: str, seed: int = 0) -> Path:
+    """Where a row's diffuse_albedo.exr, shading.exr and score.json lie.
+
+    Parameters
+    ----------
+    work : folder of a subject's rows
+    input_name : one of INPUTS
+    method : one of METHODS
+    seed : of the noise
+    """
+    return work / f"{input_name}_{method.replace(', ', '_').replace(' ', '_')}_{seed}"
+
+
+def solve_by_method(
+    capture: Capture, settings: Settings, method: str, seed: int
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Solves a capture by one method.
+
+    Parameters
+    ----------
+    capture : with texture and mask
+    settings : of the solve
+    method : one of METHODS
+    seed : of the noise
+
+    Returns
+    -------
+    Diffuse albedo and shading, linear [S, S, 3], and the seconds that it took.
+    """
+    began = time.monotonic()
+    head = read_head(capture)
+    evidence = read_evidence(capture, head, settings.solve.size)
+    if method in ("texture", "over its blur"):
+        return *_by_hand(capture, evidence, settings, method), time.monotonic() - began
+    prior = _prior()
+    cell = evidence.cell_side(settings.solve.grid_cells)
+    tone = read_given_tone(settings.solve.skin_tone)
+    start = start_solve(
+        prior,
+        evidence,
+        tone.tensor,
+        cell,
+        recipe_of(settings, prior),
+        make_head_cells,
+        callbacks=Callbacks(lambda marks: confirm_marks(capture, head, marks, evidence.size)),
+    )
+    fit, recipe = {}, start.recipe
+    if method in LIGHTS:
+        start, recipe, move = LIGHTS[method](start, recipe)
+        fit = {"fit": move}
+    if method == FREE:
+        state = fit_texels(start, replace(recipe, decay=0.995), FREE_UPDATES, smooth=FREE_SMOOTH, **fit)
+    else:
+        sampler = Sampler(prior.of_tone(start.tone), recipe, seed_noise(seed), **fit)
+        state = sampler.sample(start.observations, start.state)
+    result = maps.finish_maps(state, evidence, start)
+    return result.diffuse, result.shading, time.monotonic() - began
+
+
+def _by_hand(capture: Capture, evidence: Evidence, settings: Settings, method: str) -> tuple[np.ndarray, np.ndarray]:
+    """The texture, or the texture over its own blur, brought to the skin tone; and what it was divided by."""
+    size, weight = evidence.size, evidence.weight.numpy()[..., None]
+    texture = np.maximum(images.resize(images.read_linear(capture.texture), size, size), 0)
+    shading = np.ones_like(texture)
+    if method != "texture":
+        blurred, share = (
+            cv2.GaussianBlur(a, (0, 0), BLUR * len(texture)) for a in (texture * weight, np.repeat(weight, 3, 2))
+        )
+        shading = np.maximum(blurred / np.maximum(share, 1e-3), 1e-3)
+    skin = weight * evidence.skin.numpy()[..., None]
+    tone = np.array(read_given_tone(settings.solve.skin_tone).linear, np.float32)
+    gain = tone * skin.sum() / np.maximum((texture / shading * skin).sum((0, 1)), 1e-6)
+    return (texture / shading * gain).astype(np.float32), (shading / gain).astype(np.float32)
+
+
+def _keep(row: Path, diffuse: np.ndarray, shading: np.ndarray, seconds: float, looks: list) -> None:
+    score = {**score_map(images.linear_to_srgb(np.clip(diffuse, 0, 1)), looks), "seconds": round(seconds, 1)}
+    with replacing_folder(row) as folder:
+        images.write_linear(folder / "diffuse_albedo.exr", diffuse)
+        images.write_linear(folder / "shading.exr", shading)
+        write_json(folder / "score.json", score)
+
+
+def _raw(source: Capture, folder: Path, settings: Settings) -> Capture:
+    """A copy of a capture whose texture is the frames' as filmed, with the mask that the chain proposes for it; made
+    once."""
+    copy = Capture(folder)
+    if not copy.shadow_mask_auto.is_file():
+        shutil.rmtree(folder, ignore_errors=True)
+        later = shutil.ignore_patterns(
+            "maps*",
+            "preview",
+            "checkpoints",
+            "renders",
+            "delivery",
+            "delit",
+            "lock",
+            "shadow_mask*",
+            "mask_history",
+            "texture*",
+        )
+        shutil.copytree(source.root, folder, ignore=later)
+        run_stages(copy, settings, "delight", "texture", "shadow_mask")
+    return copy
+
+
+@cache
+def _prior():
+    return load()
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    main()

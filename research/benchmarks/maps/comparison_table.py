@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The tables of research/benchmarks/maps/comparison.py: means over the subjects, and ours less each other method,
+person by person."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import figures
+
+INPUTS = ("delit", "raw")
+OURS = "wildcap"
+COLUMNS = {
+    "PSNR": lambda s: s["raw"]["psnr"],
+    "after one gain": lambda s: s["gain"]["psnr"],
+    "SSIM": lambda s: s["gain"]["ssim"],
+    "FLIP": lambda s: s["gain"]["flip"],
+    "detail": lambda s: s["detail"],
+    "shadow step": lambda s: s["shadow_step"],
+}
+FORMATS = {
+    "PSNR": "{:.2f}",
+    "after one gain": "{:.2f}",
+    "SSIM": "{:.3f}",
+    "FLIP": "{:.3f}",
+    "detail": "{:.2f}",
+    "shadow step": "{:.2f}",
+}
+
+
+def means(subjects: list[dict]) -> dict:
+    """Of several subjects' figures: input -> method -> column -> mean of the first seed; and 'spread': half of what two
+    seeds of ours differ by."""
+    out: dict = {
+        given: {
+            method: {
+                column: _mean([value(one[given][method]["0"]) for one in subjects]) for column, value in COLUMNS.items()
+            }
+            for method in subjects[0][given]
+        }
+        for given in subjects[0]
+    }
+    two = [one["delit"][OURS] for one in subjects]
+    return out | {
+        "spread": {
+            column: _mean([abs(value(s["0"]) - value(s["1"])) / 2 for s in two if value(s["0"]) is not None])
+            for column, value in COLUMNS.items()
+        }
+    }
+
+
+def table(record: dict) -> str:
+    """Markdown: a line per row with the means over the people, of each input's rows the best of each column and what
+    ties with it in bold; then the scan's."""
+    parts = []
+    for key, title in (("people", "mean of the people"), ("scan", "head scan")):
+        if key not in record:
+            continue
+        lines, spread = [], record[key]["spread"]
+        for given in INPUTS:
+            rows = record[key].get(given, {})
+            for method, cells in rows.items():
+                line = [
+                    _cell(column, cells[column], [r[column] for r in rows.values()], spread[column])
+                    for column in COLUMNS
+                ]
+                lines.append([f"{given}: {method}", *line])
+        lines.append(["*spread over seeds*", *(_text(column, spread[column]) for column in COLUMNS)])
+        parts.append(figures.markdown([title, *COLUMNS], lines))
+    return "\n\n".join(parts)
+
+
+DIFFERENCES = {
+    "PSNR, dB": ("raw", "psnr", "{:+.2f} ± {:.2f}"),
+    "after one gain, dB": ("gain", "psnr", "{:+.2f} ± {:.2f}"),
+    "FLIP": ("gain", "flip", "{:+.4f} ± {:.4f}"),
+}
+
+
+def paired(subjects: dict[str, dict]) -> dict:
+    """Ours less each other method, person by person: input -> method -> column of DIFFERENCES -> mean and the standard
+    error of the mean. subjects: name -> what comparison.compare_methods found."""
+
+    def differences(given: str, method: str, about: str, figure: str) -> tuple[float, float]:
+        gains = [
+            one[given][OURS]["0"][about][figure] - one[given][method]["0"][about][figure] for one in subjects.values()
+        ]
+        return float(np.mean(gains)), float(np.std(gains, ddof=1) / len(gains) ** 0.5)
+
+    return {
+        given: {
+            method: {
+                column: differences(given, method, about, figure) for column, (about, figure, _) in DIFFERENCES.items()
+            }
+            for method in methods
+            if method != OURS
+        }
+        for given, methods in next(iter(subjects.values())).items()
+    }
+
+
+def paired_table(subjects: dict[str, dict]) -> str:
+    """Markdown of `paired`: bold where ours is better by more than two standard errors, italic where worse by more
+    than one."""
+    lines = []
+    for given, methods in paired(subjects).items():
+        for method, found in methods.items():
+            line = [f"{given}: less {method}"]
+            for column, (mean, error) in found.items():
+                text, better = DIFFERENCES[column][2].format(mean, error), -mean if column == "FLIP" else mean
+                line.append(f"**{text}**" if better > 2 * error else f"*{text}*" if better < -error else text)
+            lines.append(line)
+    return figures.markdown(["ours, person by person", *DIFFERENCES], lines)
+
+
+def _cell(column: str, figure: float | None, column_values: list[float | None], spread: float | None) -> str:
+    known = [_badness(column, v) for v in column_values if v is not None]
+    text = _text(column, figure)
+    return f"**{text}**" if figure is not None and _badness(column, figure) <= min(known) + (spread or 0) else text
+
+
+def _badness(column: str, figure: float) -> float:
+    return abs(figure) if column == "shadow step" else figure if column == "FLIP" else -figure
+
+
+def _text(column: str, figure: float | None) -> str:
+    return "-" if figure is None else FORMATS[column].format(figure)
+
+
+def _mean(scores: list[float | None]) -> float | None:
+    known = [v for v in scores if v is not None]
+    return float(np.mean(known)) if known else None

@@ -1,0 +1,215 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Geometry and texture alone: textures of the true albedo frames, taken for the albedo, against those same frames.
+
+    python -m research.benchmarks.maps.texture CAPTURE TRUTH [--rows NAME ...] [--steps N] [--size N] [--leave-out N]
+    [--pictures FOLDER]
+
+CAPTURE is registered (cameras, head.obj); TRUTH is laid out as research/benchmarks/maps/albedo_score.py says. Its
+albedo frames go through the `folder` delighter, V = those. Prints one JSON with, per row, the score of albedo_score and
+the marks of research/benchmarks/maps/detail.py:
+  average      the weighted mean of all views: the minimum of a squared loss
+  blend        in bands, not aligned
+  aligned      what the stage does by default
+  perceptual   the aligned blend after --steps of the paper's texture loss
+  delit        as aligned, from the capture's own delit frames: what its delighter's errors add
+and "leave_one_out": the aligned texture scored in N frames, each time built without that frame.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from core.capture.capture import Capture
+from core.capture.frame_records import read_frames
+from core.capture.messages import Problem, Reporter
+from core.face.head import read_head
+from core.geometry import raster
+from core.geometry.views import read_views
+from core.imaging import images
+from core.settings.settings import from_json
+from core.stages import texture
+from core.stages.texture.blend import weighted_mean
+
+from ..captures.continued import begin_at_delight, run_stages
+from .albedo_score import compare, mean_scores, read_truth
+from .detail import FaceRays, cast_face_rays, centre_rays, marks, mean_of
+
+ROWS = ("average", "blend", "aligned", "perceptual", "delit")
+STEPS = 150
+
+
+def measure_rows(
+    capture: Capture,
+    truth: Path,
+    rows: tuple[str, ...] = ROWS,
+    steps: int = STEPS,
+    size: int = 1024,
+    leave_out: int = 4,
+    pictures: Path | None = None,
+) -> dict:
+    """Scores the textures of a capture.
+
+    Parameters
+    ----------
+    capture : registered
+    truth : folder, laid out as research/benchmarks/maps/albedo_score.py says
+    rows : of ROWS
+    steps : of the perceptual row's optimisation
+    size : texels along a side
+    leave_out : how many views are left out, one at a time; 0: none
+    pictures : folder that takes each row's texture
+
+    Returns
+    -------
+    Row -> figures; "leave_one_out", too.
+
+    Raises
+    ------
+    Problem
+        Where the capture is not registered or no true frame belongs to it.
+    """
+    if not capture.head.is_file():
+        raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
+    head, report, results = read_head(capture), Reporter("texture"), {}
+    looks = looks_of(capture, head.caster, truth)
+    if "delit" in rows and any(capture.delit.glob("*.png")):
+        results["delit"] = _row(
+            "aligned",
+            *texture.observe_all(capture, head, size, report)[:2],
+            looks,
+            steps,
+            pictures and pictures / "delit.jpg",
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        copy = begin_at_delight(capture, Path(folder) / "copy.wildcap")
+        delighter = from_json({"delight": {"delighter": "folder", "folder": str(truth.absolute() / "albedo")}})
+        run_stages(copy, delighter, "delight")
+        observations, surface, _ = texture.observe_all(copy, head, size, report)
+        for row in (row for row in rows if row != "delit"):
+            try:
+                results[row] = _row(row, observations, surface, looks, steps, pictures and pictures / f"{row}.jpg")
+            except Problem as problem:  # the perceptual network is not everywhere; the other rows are
+                results[row] = {"not_run": f"{problem.problem} {problem.remedy}"}
+        if leave_out:
+            results["leave_one_out"] = _leave_one_out(observations, surface, looks, leave_out)
+    return results
+
+
+def looks_of(capture: Capture, caster: raster.RayCaster, truth: Path) -> dict[str, FaceRays]:
+    """Frame name -> what its rays meet, of the registered frames with a true albedo."""
+    frames = read_frames(capture).by_name
+    known = {true.frame: true for true in read_truth(truth)}
+    found = {
+        view.name: cast_face_rays(caster, view, known[frames[view.name].video_frame])
+        for view in read_views(capture)
+        if frames[view.name].video_frame in known
+    }
+    if not found:
+        raise Problem(
+            f"No registered frame of {capture.root} has a true albedo in {truth}.",
+            "Check that the two belong together.",
+        )
+    return found
+
+
+def _row(
+    row: str, observations: list, surface, looks: dict[str, FaceRays], steps: int, picture: Path | None = None
+) -> dict:
+    started = time.monotonic()
+    map_ = _texture(row, [replace(o) for o in observations], surface, steps)
+    seconds = time.monotonic() - started
+    if picture:
+        images.write_srgb(picture, map_)
+    return {**score(map_, looks.values()), "seconds": round(seconds, 1)}
+
+
+def _texture(row: str, observations: list, surface, steps: int) -> np.ndarray:
+    """A row's map, sRGB [S, S, 3]. The observations are used up."""
+    if row == "average":
+        linear = weighted_mean([np.exp(o.log_colour) for o in observations], [o.weight for o in observations])
+        seen = 1 - np.prod([1 - o.quality for o in observations], axis=0)
+        confidence = np.where(surface.covered, seen, 0).astype(np.float32)
+    else:
+        settings = from_json({"texture": {"perceptual": steps if row == "perceptual" else 0}})
+        built = texture.build(observations, surface, settings, Reporter("texture"), aligned=row != "blend")
+        linear, confidence = np.exp(built.log_texture), built.confidence
+    return images.linear_to_srgb(texture.fill(linear, confidence, surface.covered))
+
+
+def score(map_: np.ndarray, frames: Iterable[FaceRays]) -> dict:
+    """albedo_score's figures of a map, sRGB [S, S, 3], and those of research/benchmarks/maps/detail.py, means over the
+    frames."""
+    scores, found = [], []
+    for seen in frames:
+        predicted, hit = centre_rays(seen, map_)
+        scores.append(compare(predicted, seen.true, seen.true.face & hit))
+        found.append(marks(seen, map_))
+    mean = mean_scores(scores)
+    return {
+        **mean["raw"],
+        **{f"{name}_after_gain": value for name, value in mean["gain"].items()},
+        "detail": mean["detail"],
+        "shadow_step": mean["shadow_step"],
+        "frames": len(scores),
+        **mean_of(found),
+    }
+
+
+def _leave_one_out(observations: list, surface, looks: dict[str, FaceRays], count: int) -> dict:
+    """The aligned texture without one view, scored in that view alone; `count` views in turn, evenly spread."""
+    names = [o.name for o in observations if o.name in looks]
+    chosen = [names[i] for i in np.unique(np.linspace(1, max(len(names) - 2, 1), count).round().astype(int))]
+    frames = {
+        name: score(
+            _texture("aligned", [replace(o) for o in observations if o.name != name], surface, 0), [looks[name]]
+        )
+        for name in chosen
+    }
+    figures = ("psnr", "ssim", "detail", "mole_contrast", "pore_contrast", "pore_correlation")
+    return {
+        **{
+            f: float(np.mean(values))
+            for f in figures
+            if (values := [v[f] for v in frames.values() if v.get(f) is not None])
+        },
+        "frames": frames,
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("capture", type=Path)
+    parser.add_argument("truth", type=Path)
+    parser.add_argument("--rows", nargs="*", choices=ROWS, default=ROWS)
+    parser.add_argument("--steps", type=int, default=STEPS, help="of the perceptual row")
+    parser.add_argument("--size", type=int, default=1024, help="side of the textures")
+    parser.add_argument("--leave-out", type=int, default=4, help="frames that are left out in turn; 0 for none")
+    parser.add_argument("--pictures", type=Path, help="folder for the rows' textures")
+    options = parser.parse_args()
+    print(
+        json.dumps(
+            measure_rows(
+                Capture(options.capture.resolve()),
+                options.truth,
+                tuple(options.rows),
+                options.steps,
+                options.size,
+                options.leave_out,
+                options.pictures,
+            ),
+            indent=1,
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,154 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One subject's row of the gallery in docs/results/gallery.md, by one command; two lines of seven pictures:
+
+    python -m research.benchmarks.pictures.gallery FOLDER/NAME.wildcap docs/pictures/gallery_NAME.jpg [--truth
+        FOLDER/NAME/maps]
+
+captured frame, delit frame, texture, shadow mask over it, diffuse albedo, true albedo (of --truth; black without it),
+specular albedo; normals, shading, a close-up of the albedo beside the nose, the head under four lights of the add-on:
+three lamps, a window, the sun, a city. Relit pictures are Cycles's linear light under the sRGB curve, clipped:
+Blender's view transform Standard, no look, exposure as the presets have it. Renders that are newer than the maps are
+taken as they are.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from core.capture.capture import Capture
+from core.face import template
+from core.geometry import meshes, raster
+from core.geometry.views import View, read_views
+from core.imaging import images
+
+ROOT = Path(__file__).resolve().parents[3]
+LIGHTS = ("three_point", "window", "sun", "city.exr")
+TILE, RESOLUTION, SAMPLES = 224, 320, 24  # pixels, pixels, rays per pixel
+# MediaPipe's landmark beside the nose, on the person's right; side of the close-up as a share of the map
+CHEEK, CLOSE_UP = 203, 0.11
+MOST_BYTES = 180_000
+QUALITIES = (90, 86, 82, 78, 74, 70, 64)  # of the JPEG, the first that is small enough
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("capture", type=Path)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--truth", type=Path)
+    arguments = parser.parse_args()
+    capture = Capture(arguments.capture.resolve())
+    write_small(arguments.out, sheet(captured(capture) + solved(capture, arguments.truth) + relit(capture)))
+
+
+def captured(capture: Capture) -> list[np.ndarray]:
+    """Frame and delit frame about the face, texture, and mask over the texture: sRGB, square."""
+    views = read_views(capture, selected_only=True)
+    head = meshes.read_obj(capture.head)
+    # from the front
+    view = max((v for v in views if (capture.delit / f"{Path(v.name).stem}.png").is_file()), key=lambda v: v.axis[1])
+    box = face_square(view, head)
+    # a delighter knows nothing of what is behind the head
+    cover = (raster.render_view(raster.RayCaster(head), view)[0] >= 0)[..., None]
+    texture = images.read_srgb(capture.texture_png)
+    mask = images.read_mask(capture.shadow_mask if capture.shadow_mask.exists() else capture.shadow_mask_auto)
+    mask = images.resize(mask, texture.shape[1], texture.shape[0])[..., None]
+    delit = images.read_srgb(capture.delit / f"{Path(view.name).stem}.png") * cover
+    return [view.read()[box], delit[box], texture, texture * (1 - 0.6 * mask) + mask * np.float32([0.6, 0, 0])]
+
+
+def solved(capture: Capture, truth: Path | None) -> list[np.ndarray]:
+    """Albedo, true albedo, specular, normal, shading and a close-up of the albedo at the delivered size: sRGB,
+    square."""
+    maps = capture.maps_4k if (capture.maps_4k / "shading.exr").is_file() else capture.maps
+    albedo = images.read_srgb(maps / "diffuse_albedo.png")
+    true = images.read_srgb(truth / "diffuse_albedo.png") if truth else np.zeros((8, 8, 3), np.float32)
+    specular, normal = (images.read_data(capture.maps / f"{name}.png") for name in ("specular_albedo", "normal"))
+    shading = images.read_linear(capture.maps / "shading.exr")
+    shading = images.linear_to_srgb(shading * (0.6 / max(float(np.percentile(shading, 95)), 1e-6)))
+    side = round(CLOSE_UP * len(albedo))
+    column, row = np.round(landmark_uv(CHEEK) * len(albedo) - side / 2).astype(int)
+    return [
+        albedo,
+        true,
+        np.repeat(specular[..., :1], 3, 2),
+        normal[..., :3],
+        shading,
+        albedo[row : row + side, column : column + side],
+    ]
+
+
+def relit(capture: Capture) -> list[np.ndarray]:
+    """The head under LIGHTS, rendered where that is not done: sRGB, square."""
+    paths = [capture.renders / f"{Path(light).stem}.exr" for light in LIGHTS]
+    made = max(
+        path.stat().st_mtime
+        for folder in (capture.maps, capture.maps_4k)
+        if folder.is_dir()
+        for path in folder.glob("*.png")
+    )
+    stale = [
+        light for light, path in zip(LIGHTS, paths, strict=True) if not path.is_file() or path.stat().st_mtime < made
+    ]
+    if stale:
+        subprocess.run(
+            [
+                sys.executable,
+                "-m",
+                "research.benchmarks.pictures.render_capture",
+                str(capture.root),
+                *stale,
+                "--resolution",
+                str(RESOLUTION),
+                "--samples",
+                str(SAMPLES),
+            ],
+            cwd=ROOT,
+            check=True,
+            stdout=subprocess.DEVNULL,
+        )
+    return [images.linear_to_srgb(images.read_linear(path)) for path in paths]
+
+
+def face_square(view: View, head: meshes.Mesh) -> tuple[slice, slice]:
+    """Rows and columns of the square about the face in a view, within the picture."""
+    pixels, _ = view.project(template.landmark_points(head))
+    middle, side = (pixels.min(0) + pixels.max(0)) / 2, 1.35 * (pixels.max(0) - pixels.min(0)).max()
+    side = int(min(side, view.width, view.height))
+    left, top = (int(np.clip(middle[k] - side / 2, 0, (view.width, view.height)[k] - side)) for k in (0, 1))
+    return slice(top, top + side), slice(left, left + side)
+
+
+def landmark_uv(index: int) -> np.ndarray:
+    """Where a landmark lies on a map of the built-in head: column and row [2] as shares of its side."""
+    face, bary = template.landmarks()
+    head = template.load()
+    u, v = (head.uvs[head.face_uvs[face[index]]] * bary[index][:, None]).sum(0)
+    return np.array([u, 1 - v])
+
+
+def sheet(pictures: list[np.ndarray]) -> np.ndarray:
+    """Square pictures in two lines, each TILE wide."""
+    tiles = [np.clip(images.resize(np.asarray(picture, np.float32), TILE, TILE), 0, 1) for picture in pictures]
+    half = (len(tiles) + 1) // 2
+    tiles += [np.zeros_like(tiles[0])] * (2 * half - len(tiles))
+    return np.vstack([np.hstack(tiles[:half]), np.hstack(tiles[half:])])
+
+
+def write_small(path: Path, srgb: np.ndarray) -> None:
+    """A JPEG of the best of QUALITIES that takes no more than MOST_BYTES."""
+    for quality in QUALITIES:
+        images.write_srgb(path, srgb, quality=quality)
+        if path.stat().st_size <= MOST_BYTES:
+            return
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    main()

@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Renders a solved capture with Cycles through the installed extension's own functions, in a process of its own.
+
+    python -m research.benchmarks.pictures.render_capture CAPTURE [LIGHT ...] [--resolution PX] [--samples N]
+    python -m research.benchmarks.pictures.render_capture CAPTURE --contact-sheet
+
+Each light (default: all presets; the name of one of Blender's worlds means that) gives renders/LIGHT.png, shown without
+a look, and the linear renders/LIGHT.exr; --contact-sheet joins all presets to renders/contact_sheet.png. (With Blender
+itself: blender --command wildcap ...)
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from ...people.blender_module import without_numpy_1
+
+ROOT = Path(__file__).resolve().parents[3]
+EXTENSION = "bl_ext.user_default.wildcap"
+"""The checkout's name in Blender, the very one that users get."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("capture", type=Path)
+    parser.add_argument("lights", nargs="*", metavar="LIGHT")
+    parser.add_argument("--resolution", type=int, default=640)
+    parser.add_argument("--samples", type=int, default=32)
+    parser.add_argument("--contact-sheet", action="store_true")
+    asked = parser.parse_args()
+    with extension():
+        from bl_ext.user_default.wildcap.wildcap_addon.relight import headless
+
+        if asked.contact_sheet:
+            print(headless.render_contact_sheet(asked.capture, asked.resolution, asked.samples), flush=True)
+            return
+        for path in headless.render_relit(asked.capture, asked.lights or headless.ALL, asked.resolution, asked.samples):
+            print(path, flush=True)
+
+
+@contextlib.contextmanager
+def extension() -> Iterator[None]:
+    """The checkout, enabled in this process's Blender as EXTENSION."""
+    with tempfile.TemporaryDirectory() as extensions:
+        repository = Path(extensions) / "user_default"
+        repository.mkdir()
+        (repository / "wildcap").symlink_to(ROOT, target_is_directory=True)
+        os.environ["BLENDER_USER_EXTENSIONS"] = extensions
+        with without_numpy_1():
+            import bpy  # noqa: F401  (makes addon_utils importable)
+        import addon_utils
+
+        if addon_utils.enable(EXTENSION, default_set=True) is None:
+            raise SystemExit("Blender could not enable the extension.")
+        try:
+            yield
+        finally:
+            addon_utils.disable(EXTENSION)  # a class left registered crashes the wheel at exit
+
+
+if __name__ == "__main__":
+    main()

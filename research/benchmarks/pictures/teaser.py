@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The README's picture of a finished capture: a frame, the mask over the texture, the solved albedo, and below them the
+head under three lights.
+
+    python -m research.benchmarks.pictures.teaser .demo/sample.wildcap docs/pictures/teaser.jpg
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from core.capture.capture import Capture
+from core.geometry.views import read_views
+from core.imaging import images
+
+SIDE = 480
+LIGHTS = "sun", "three_point", "window"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("capture", type=Path, help="solved and rendered, as `make demo` leaves it")
+    parser.add_argument("target", type=Path)
+    arguments = parser.parse_args()
+    capture = Capture(arguments.capture)
+    views = read_views(capture, selected_only=True)
+    texture = images.read_srgb(capture.texture_png)
+    mask = images.read_mask(capture.shadow_mask if capture.shadow_mask.exists() else capture.shadow_mask_auto)
+    mask = images.resize(mask, texture.shape[1], texture.shape[0])[..., None]
+    albedo = capture.maps_4k if capture.maps_4k.is_dir() else capture.maps
+    above = [
+        images.read_srgb(views[len(views) // 2].path),
+        texture * (1 - 0.6 * mask) + mask * np.float32([0.6, 0, 0]),
+        images.read_srgb(albedo / "diffuse_albedo.png"),
+    ]
+    below = [images.read_srgb(capture.renders / f"{light}.png") for light in LIGHTS]
+    images.write_srgb(
+        arguments.target,
+        np.vstack([np.hstack([_square(picture) for picture in row]) for row in (above, below)]),
+        quality=88,
+    )
+
+
+def _square(picture: np.ndarray) -> np.ndarray:
+    """Cropped to its middle square and resampled to SIDE."""
+    height, width = picture.shape[:2]
+    side = min(height, width)
+    top, left = (height - side) // 3, (width - side) // 2
+    return images.resize(picture[top : top + side, left : left + side], SIDE, SIDE)
+
+
+if __name__ == "__main__":
+    main()
