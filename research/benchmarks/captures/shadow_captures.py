@@ -124,13 +124,8 @@ def write_views(
 ) -> None:
     """Writes frames/ with frames.json, and cameras/: pictures with the known cameras that took them.
 
-    Parameters
-    ----------
-    capture : takes them
-    views : the cameras, which share one lens
-    pictures : sRGB [H, W, 3], one of each
-    selected : how many, evenly spread, are selected for the texture; None: all
-    """
+    capture: takes them; views: the cameras, which share one lens; pictures: sRGB [H, W, 3], one of each; selected: how
+    many, evenly spread, are selected for the texture; None: all."""
     capture.claim()
     taken = np.linspace(0, len(views) - 1, selected or len(views)).round().astype(int)
     model = pycolmap.Reconstruction()
@@ -154,18 +149,8 @@ def render_picture(
 ) -> np.ndarray:
     """A picture of a head before a dim, uneven background.
 
-    Parameters
-    ----------
-    caster : of the head
-    view : the camera
-    texture : lit, linear [S, S, 3]
-    rng : of background and noise
-    rays : along each side of a pixel
-
-    Returns
-    -------
-    sRGB [H, W, 3].
-    """
+    caster: of the head; view: the camera; texture: lit, linear [S, S, 3]; rng: of background and noise; rays: along
+    each side of a pixel. Returns sRGB [H, W, 3]."""
     face, bary, _ = raster.render_view(caster, view, rays)
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
     at = np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(texture)

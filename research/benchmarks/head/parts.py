@@ -166,13 +166,8 @@ def _share(count: int, total: int) -> float | None:
 def write_sheet(out: Path, pictures: list[Path], network: ParseNet, brighter: float) -> None:
     """Draws the crops of photographs, and beside each its parts: in colours, and laid over it.
 
-    Parameters
-    ----------
-    out : of the sheet
-    pictures : files, and folders of them
-    network : reads the parts
-    brighter : factor on the pictures' sRGB values
-    """
+    out: of the sheet; pictures: files, and folders of them; network: reads the parts; brighter: factor on the pictures'
+    sRGB values."""
     rows = []
     for path in [
         path

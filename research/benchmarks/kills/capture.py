@@ -159,18 +159,8 @@ def run_undisturbed(
 ) -> Undisturbed:
     """Runs the chain up to a stage, and keeps the place before each and at the end.
 
-    Parameters
-    ----------
-    folder : takes before_STAGE and end
-    until : the last stage
-    delighter : its setting
-    tell : hears a line per stage
-
-    Raises
-    ------
-    AssertionError
-        Where a stage does not end well; and the machine's own errors.
-    """
+    folder: takes before_STAGE and end; until: the last stage; delighter: its setting; tell: hears a line per stage.
+    Raises AssertionError where a stage does not end well; and the machine's own errors."""
     names = stages.NAMES[: stages.NAMES.index(until) + 1]
     found = Undisturbed(folder, {**SETTINGS, "delight": {"delighter": delighter}}, names)
     place = folder / "end"
@@ -194,14 +184,8 @@ def start_job(
 ) -> Forked:
     """Writes a job and starts a worker at it.
 
-    Parameters
-    ----------
-    place : whose capture
-    moment : when the worker is struck; None: never
-    log_name : ending of the file beside the place that takes its output
-    limits : `term_s` and `most_bytes` of `fork_worker`
-    job : as `write_job` has it
-    """
+    place: whose capture; moment: when the worker is struck; None: never; log_name: ending of the file beside the place
+    that takes its output; limits: `term_s` and `most_bytes` of `fork_worker`; job: as `write_job` has it."""
     return fork_worker(
         write_job(capture_at(place), **job), place.with_name(f"{place.name}.{log_name}"), moment, **(limits or {})
     )

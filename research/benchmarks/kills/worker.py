@@ -156,14 +156,8 @@ def fork_worker(
 ) -> Forked:
     """Forks a worker at a job file.
 
-    Parameters
-    ----------
-    job : job.json, in its capture
-    log : takes its output
-    moment : when it is struck; None: never
-    term_s : of its lease, in seconds
-    most_bytes : of a single file that it writes; None: any
-    """
+    job: job.json, in its capture; log: takes its output; moment: when it is struck; None: never; term_s: of its lease,
+    in seconds; most_bytes: of a single file that it writes; None: any."""
 
     def work() -> None:
         main = importlib.import_module("core.worker.__main__")

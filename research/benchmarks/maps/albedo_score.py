@@ -90,17 +90,9 @@ class HeadInView:
 def score_capture(capture: Capture, truth: Path, pictures: Path | None = None, texture: Path | None = None) -> dict:
     """Scores a solved capture.
 
-    Parameters
-    ----------
-    capture : with its maps
-    truth : folder, laid out as this module says
-    pictures : folder that takes a picture of each frame, the truth beside ours
-    texture : any picture in the head's UVs, sRGB, in place of the albedo map
-
-    Returns
-    -------
-    The figures, and "frames_not_registered".
-    """
+    capture: with its maps; truth: folder, laid out as this module says; pictures: folder that takes a picture of each
+    frame, the truth beside ours; texture: any picture in the head's UVs, sRGB, in place of the albedo map. Returns The
+    figures, and "frames_not_registered"."""
     albedo = averaged(
         images.read_srgb(
             texture or next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists())

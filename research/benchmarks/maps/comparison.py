@@ -111,17 +111,9 @@ def main() -> None:
 def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[str, dict]:
     """Scores all methods on one subject.
 
-    Parameters
-    ----------
-    source : a capture with texture and mask
-    truth : folder of the true albedo, and of the tone that all are given
-    work : takes each row's maps and scores; what is there is not solved again
-    size : of the maps, texels along a side
-
-    Returns
-    -------
-    Input -> method -> seed -> figures.
-    """
+    source: a capture with texture and mask; truth: folder of the true albedo, and of the tone that all are given; work:
+    takes each row's maps and scores; what is there is not solved again; size: of the maps, texels along a side. Returns
+    Input -> method -> seed -> figures."""
     torch.set_num_threads(1)
     found: dict[str, dict] = {given: {} for given in INPUTS}
     for given in INPUTS:
@@ -148,13 +140,7 @@ def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[st
 def find_row_folder(work: Path, input_name: str, method: str, seed: int = 0) -> Path:
     """Where a row's diffuse_albedo.exr, shading.exr and score.json lie.
 
-    Parameters
-    ----------
-    work : folder of a subject's rows
-    input_name : one of INPUTS
-    method : one of METHODS
-    seed : of the noise
-    """
+    work: folder of a subject's rows; input_name: one of INPUTS; method: one of METHODS; seed: of the noise."""
     return work / f"{input_name}_{method.replace(', ', '_').replace(' ', '_')}_{seed}"
 
 
@@ -163,17 +149,8 @@ def solve_by_method(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Solves a capture by one method.
 
-    Parameters
-    ----------
-    capture : with texture and mask
-    settings : of the solve
-    method : one of METHODS
-    seed : of the noise
-
-    Returns
-    -------
-    Diffuse albedo and shading, linear [S, S, 3], and the seconds that it took.
-    """
+    capture: with texture and mask; settings: of the solve; method: one of METHODS; seed: of the noise. Returns Diffuse
+    albedo and shading, linear [S, S, 3], and the seconds that it took."""
     began = time.monotonic()
     head = read_head(capture)
     evidence = read_evidence(capture, head, settings.solve.size)

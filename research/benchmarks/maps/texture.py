@@ -58,25 +58,10 @@ def measure_rows(
 ) -> dict:
     """Scores the textures of a capture.
 
-    Parameters
-    ----------
-    capture : registered
-    truth : folder, laid out as research/benchmarks/maps/albedo_score.py says
-    rows : of ROWS
-    steps : of the perceptual row's optimisation
-    size : texels along a side
-    leave_out : how many views are left out, one at a time; 0: none
-    pictures : folder that takes each row's texture
-
-    Returns
-    -------
-    Row -> figures; "leave_one_out", too.
-
-    Raises
-    ------
-    Problem
-        Where the capture is not registered or no true frame belongs to it.
-    """
+    capture: registered; truth: folder, laid out as research/benchmarks/maps/albedo_score.py says; rows: of ROWS; steps:
+    of the perceptual row's optimisation; size: texels along a side; leave_out: how many views are left out, one at a
+    time; 0: none; pictures: folder that takes each row's texture. Returns Row -> figures; "leave_one_out", too. Raises
+    Problem: Where the capture is not registered or no true frame belongs to it."""
     if not capture.head.is_file():
         raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
     head, report, results = read_head(capture), Reporter("texture"), {}

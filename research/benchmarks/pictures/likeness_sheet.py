@@ -32,14 +32,9 @@ def write_sheet(
 ) -> None:
     """Draws one row a person.
 
-    Parameters
-    ----------
-    out : of the JPEG
-    seeds : of the people
-    work : folder of the renders; what is there is not rendered again
-    facekit : ICT-FaceKit's folder, of which heads are derived, too; None: other heads
-    beside : folder of photographs that make the last row
-    """
+    out: of the JPEG; seeds: of the people; work: folder of the renders; what is there is not rendered again; facekit:
+    ICT-FaceKit's folder, of which heads are derived, too; None: other heads; beside: folder of photographs that make
+    the last row."""
     rows = []
     for seed in seeds:
         began = time.monotonic()
