@@ -45,10 +45,10 @@ def test_a_map_finer_than_a_pixel_is_averaged_in_linear_light(tmp_path, monkeypa
     """Texels of 0.1 and 0.5 in turns are a grey of 0.3 to a pixel that shows four of them, whichever lies in its
     middle."""
     fine = images.linear_to_srgb(np.float32([0.1, 0.5])[np.indices((2048, 2048)).sum(0) % 2])
-    images.write_srgb(tmp_path / "fine.png", np.repeat(fine[..., None], 3, 2), bits=16)
+    images.write_srgb(tmp_path / "maps" / "diffuse_albedo.png", np.repeat(fine[..., None], 3, 2), bits=16)
     monkeypatch.setattr(albedo_score, "looks", lambda capture, truth: ([], []))
     monkeypatch.setattr(albedo_score, "score_map", lambda albedo, looks: {"seen": albedo})
-    seen = albedo_score.score_capture(Capture(tmp_path), tmp_path, texture=tmp_path / "fine.png")["seen"]
+    seen = albedo_score.score_capture(Capture(tmp_path), tmp_path)["seen"]
     assert seen.shape == (1024, 1024, 3)
     assert images.srgb_to_linear(seen[4:-4, 4:-4]) == pytest.approx(0.3, abs=0.005)
     assert albedo_score.averaged(seen) is seen

@@ -4,8 +4,8 @@
 research/benchmarks/captures/people.py.
 
     python -m research.benchmarks.captures.likenesses FOLDER [--only NAME ...] [--lights own overcast below] [--facekit
-        FOLDER] python -m research.benchmarks.captures.likenesses FOLDER --sheet docs/pictures/people.jpg [--beside
-        FOLDER_OF_PICTURES]
+        FOLDER]
+    python -m research.benchmarks.captures.likenesses FOLDER --sheet docs/pictures/people.jpg [--facekit FOLDER]
 
 FOLDER/NAME has the video, capture.mp4, and the truth in the layout that research/benchmarks/maps/albedo_score.py says,
 with bare/ (albedo without hair), parts/, normal/, strands_*.npz, opened.obj, maps/ and light.json besides. In its own
@@ -75,11 +75,10 @@ def main() -> None:
     parser.add_argument("--lights", nargs="+", choices=("own", *LIGHTS), default=("own", *LIGHTS))
     parser.add_argument("--facekit", type=Path)
     parser.add_argument("--sheet", type=Path, help="render a contact sheet of the four people instead")
-    parser.add_argument("--beside", type=Path, help="of the sheet: photographs to be shown below, for looking only")
     asked = parser.parse_args()
     folder = asked.folder.resolve()
     if asked.sheet:
-        write_sheet(asked.sheet, [person.seed for person in LIKENESSES], folder / "sheet", asked.facekit, asked.beside)
+        write_sheet(asked.sheet, [person.seed for person in LIKENESSES], folder / "sheet", asked.facekit)
         return
     for person in (each for each in (*LIKENESSES, *HELD_BACK) if each.name in asked.only):
         film_likeness(person, folder, asked.lights, asked.facekit)

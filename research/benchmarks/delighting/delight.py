@@ -4,8 +4,8 @@
 the flat true tone.
 
     python -m research.benchmarks.delighting.delight [--data DIR] [--sets NAME ...] [--capture NAME=FOLDER ...]
-        [--opendelight PATH] [--quick] [--json OUT] python -m research.benchmarks.delighting.delight --sets portraits
-        --picture docs/pictures/delighters.jpg
+        [--opendelight PATH] [--quick] [--json OUT]
+    python -m research.benchmarks.delighting.delight --sets portraits --picture docs/pictures/delighters.jpg
 
 Sets: faceolat (--data: laid out like ../shared/data/faceolat), portraits (synthetic subjects that no training sees, six
 per group of skin tone, two lights each), lps_sun, sample, or any folder laid out as

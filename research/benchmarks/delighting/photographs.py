@@ -5,13 +5,12 @@ and the two slopes.
 
     python -m research.benchmarks.delighting.photographs [--data DIR] [--delighter NAME] [--weights FILE] [--sets NAME
         ...] [--subjects N]
-                                     [--json PATH] [--pictures FOLDER]
+                                     [--json PATH]
 
 Sets: faceolat (two people under twelve lights each, with their albedo and landmarks.json), lamps (DIR/near_ps_human1: a
 man with brows and a beard under seven lamps, ambient light subtracted; the merge of what each lamp lights stands for
 the truth), pairs (research/benchmarks/delighting/pairs.py, --subjects of each group of skin tone). Rows: the four
-references of research/benchmarks/measures/references.py, and the delighter. Pictures of real people are written only
-where --pictures says."""
+references of research/benchmarks/measures/references.py, and the delighter."""
 
 from __future__ import annotations
 
@@ -110,9 +109,6 @@ def main() -> int:
     parser.add_argument("--sets", nargs="+", choices=TITLES, default=list(TITLES))
     parser.add_argument("--subjects", type=int, default=2, help="of each group of skin tone")
     parser.add_argument("--json", type=Path, help="where the record goes, research/records/photographs.json")
-    parser.add_argument(
-        "--pictures", type=Path, help="folder for PERSON.png: three lights, and a row per answer; of real people"
-    )
     asked = parser.parse_args()
     if asked.weights:
         importlib.import_module("core.stages.delight.network").WEIGHTS = asked.weights
@@ -122,7 +118,7 @@ def main() -> int:
             scores = (
                 of_pairs(asked.subjects, asked.delighter)
                 if name == "pairs"
-                else of_sitters(SITTERS[name](asked.data), asked.delighter, asked.pictures)
+                else of_sitters(SITTERS[name](asked.data), asked.delighter)
             )
         except Problem as problem:
             text.append((TITLES[name], f"Not measured: {problem.problem} {problem.remedy}"))
@@ -157,7 +153,7 @@ def answer_photograph(srgb: np.ndarray, albedo: np.ndarray, lit: np.ndarray, del
     }
 
 
-def of_sitters(sitters: Iterator[LightSeries], delighter: str, pictures: Path | None = None) -> Scores:
+def of_sitters(sitters: Iterator[LightSeries], delighter: str) -> Scores:
     """Answer -> person -> figures of COLUMNS."""
     scores: Scores = {}
     for sitter in sitters:
@@ -167,8 +163,6 @@ def of_sitters(sitters: Iterator[LightSeries], delighter: str, pictures: Path | 
         ]
         for answer in given[0]:
             scores.setdefault(answer, {})[sitter.name] = of_sitter(sitter, [each[answer] for each in given])
-        if pictures:
-            images.write_srgb(pictures / f"{sitter.name}.png", sheet(sitter, given))
     return scores
 
 
@@ -286,21 +280,6 @@ def lamp_sitters(data: Path) -> Iterator[LightSeries]:
 
 
 SITTERS: dict[str, Callable[[Path], Iterator[LightSeries]]] = {"faceolat": light_stage_sitters, "lamps": lamp_sitters}
-
-
-def sheet(sitter: LightSeries, answers: list[dict[str, np.ndarray]], side: int = 256) -> np.ndarray:
-    """Three of a sitter's lights, a row per answer at the truth's tone; sRGB."""
-    rows, columns = (np.flatnonzero(sitter.face.any(axis)) for axis in (1, 0))
-    box, tone = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1], sitter.albedo[sitter.face].mean(0)
-    shown = []
-    for name in answers[0]:
-        row = []
-        for i in range(0, len(answers), max(1, len(answers) // 3)):
-            answer, lit = answers[i][name], sitter.lit[i]
-            toned = np.clip(answer * tone / np.maximum(answer[lit].mean(0), 1e-6), 0, 1)
-            row.append(images.resize(images.linear_to_srgb(toned)[box], side, side))
-        shown.append(row)
-    return np.vstack([np.hstack(row) for row in shown])
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 """How well the automatic shadow mask finds the true shadow inside the face:
 
     python -m research.benchmarks.delighting.shadow_mask [--seeds N ...] [--capture CAPTURE TRUTH] [--delighters NAME
-        ...] [--work FOLDER] [--pictures]
+        ...] [--work FOLDER]
 
 Of each synthetic subject (seeds that nothing was chosen on) a capture is made, delit by each of the delighters and
 textured. A CAPTURE that has been run up to its texture from TRUTH/capture.mp4 is judged as it is, against TRUTH/shadow.
@@ -47,11 +47,6 @@ def main() -> None:
     parser.add_argument("--delighters", nargs="+", default=["shading", "none"])
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_shadow_masks")
     parser.add_argument(
-        "--pictures",
-        action="store_true",
-        help="leave the filmed texture, the true mask and the proposal side by side in the work folder",
-    )
-    parser.add_argument(
         "--json",
         type=Path,
         help="where the figures go, such as research/records/shadow_mask.json; those of other rows stay",
@@ -62,7 +57,7 @@ def main() -> None:
     for delighter in asked.delighters:
         names = [f"synthetic {seed}, {KINDS[seed % len(KINDS)]}" for seed in asked.seeds]
         rows = [
-            _row(*_synthetic(seed, delighter, asked.work), name, delighter, asked)
+            _row(*_synthetic(seed, delighter, asked.work), name, delighter)
             for seed, name in zip(asked.seeds, names, strict=True)
         ]
         found |= {f"{name}, {delighter}": _figures(name, delighter, row) for name, row in zip(names, rows, strict=True)}
@@ -70,7 +65,7 @@ def main() -> None:
             _print("mean of the synthetic", delighter, np.mean(rows, 0))
     for capture, truth in asked.capture:
         delighter = _delighter_of(Capture(capture))
-        row = _row(*_filmed(capture, truth, asked.work), capture.stem, delighter, asked)
+        row = _row(*_filmed(capture, truth, asked.work), capture.stem, delighter)
         found[f"{capture.stem}, {delighter}"] = _figures(capture.stem, delighter, row)
     if asked.json:
         write_record(
@@ -103,9 +98,7 @@ def scores(proposed: np.ndarray, true: np.ndarray, judged: np.ndarray) -> tuple[
     )
 
 
-def _row(
-    capture: Capture, true: np.ndarray, name: str, delighter: str, arguments: argparse.Namespace
-) -> tuple[float, ...]:
+def _row(capture: Capture, true: np.ndarray, name: str, delighter: str) -> tuple[float, ...]:
     began = time.process_time()
     _run(capture, delighter, "shadow_mask")
     seconds = time.process_time() - began
@@ -114,11 +107,6 @@ def _row(
     skin = (template.mask("skin", SIZE) > 0.5) & (template.mask("face", SIZE) > 0.5)
     found = (*scores(mask > 0.5, true, skin & (confidence > 0.1)), seconds)
     _print(name, delighter, found)
-    if arguments.pictures:
-        path = capture.texture_filmed if capture.texture_filmed.is_file() else capture.texture_png
-        filmed = images.resize(images.read_srgb(path), SIZE, SIZE)
-        grey = [np.repeat(m.astype(np.float32)[..., None], 3, -1) for m in (true, mask)]
-        images.write_srgb(arguments.work / f"{capture.root.stem}_{delighter}.png", np.hstack([filmed, *grey]))
     return found
 
 

@@ -3,17 +3,16 @@
 """Where the albedo stands: every measure of research/benchmarks/measures on captures with a known albedo, several per
 person, beside four reference answers.
 
-    python -m research.benchmarks.delighting.state FOLDER [--truths FOLDER] [--only PREFIX ...] [--run [--quality NAME]]
+    python -m research.benchmarks.delighting.state FOLDER [--only PREFIX ...] [--run]
         [--page PATH] [--json PATH]
 
 FOLDER holds NAME.wildcap of research/benchmarks/captures/people.py or of the same layout, or what
-research/benchmarks/freeze.py kept of them; NAME/ with the truth lies beside it or in --truths. All captures whose
-truths have the same head.obj show one person. Measured are the texture of the delit frames and the solved maps;
-captures that lack a texture are left out, or with --run taken through the chain first, from the stage delight on, or
-scan where there is no head. FOLDER/state keeps each capture's figures in pictures, which take the time, and NAME.jpg
-with its maps: a second run goes on where the first stopped. Likenesses stay there; nothing of them is published. People
-whose figures --json's record holds already, by the same code, stay in it and on the page: the table may be made person
-by person.
+research/benchmarks/freeze.py kept of them; NAME/ with the truth lies beside it. All captures whose truths have the same
+head.obj show one person. Measured are the texture of the delit frames and the solved maps; captures that lack a texture
+are left out, or with --run taken through the chain first, from the stage delight on, or scan where there is no head.
+FOLDER/state keeps each capture's figures in pictures, which take the time: a second run goes on where the first
+stopped. People whose figures --json's record holds already, by the same code, stay in it and on the page: the table may
+be made person by person.
 """
 
 from __future__ import annotations
@@ -30,13 +29,10 @@ from core.capture.capture import Capture
 from core.capture.code_key import write_canonically
 from core.capture.files import write_json
 from core.capture.hashes import hash_bytes, hash_file, hash_tree, hash_value
-from core.face import template
-from core.imaging import images
-from core.settings.settings import QUALITIES
 
 from .. import figures, freeze
 from ..captures import people, state_captures
-from ..captures.state_captures import DELIT, METHODS, SIZE, SOLVED, Filmed, find
+from ..captures.state_captures import DELIT, METHODS, SOLVED, Filmed, find
 from ..maps import albedo_score
 from ..maps.albedo_score import looks
 from ..measures.table import Column, Scores, format_table, summarise, to_record
@@ -121,25 +117,22 @@ INTRODUCTION = (
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--truths", type=Path, help="where NAME/ with the truth lies, if not in FOLDER")
     parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
     parser.add_argument(
         "--run", action="store_true", help="run the chain, to the solve, on captures where it is not fresh"
     )
-    parser.add_argument("--quality", choices=QUALITIES, default="standard", help="of --run")
     parser.add_argument("--page", type=Path, help="where the page goes, docs/results/state.md")
     parser.add_argument("--json", type=Path, help="where the record goes, research/records/state.json")
     asked = parser.parse_args()
     folder = asked.folder.resolve()
-    truths = (asked.truths or folder).resolve()
     if asked.run and (folder / freeze.RECORD).is_file():
         parser.error(f"{folder} is what research/benchmarks/freeze.py kept, and stays as it is. Run a copy of it.")
     if asked.run:
         for path in sorted(folder.glob("*.wildcap")):
-            if path.stem.startswith(tuple(asked.only)) and (truths / path.stem / "skin_tone.txt").is_file():
-                run_chain(Capture(path), truths / path.stem, asked.quality)
+            if path.stem.startswith(tuple(asked.only)) and (folder / path.stem / "skin_tone.txt").is_file():
+                run_chain(Capture(path), folder / path.stem)
     captures = [
-        filmed for filmed in find(folder, truths, folder / "state") if filmed.name.startswith(tuple(asked.only))
+        filmed for filmed in find(folder, folder, folder / "state") if filmed.name.startswith(tuple(asked.only))
     ]
     if not captures:
         parser.error(
@@ -168,11 +161,11 @@ def main() -> int:
     return 0
 
 
-def run_chain(capture: Capture, truth: Path, quality: str) -> None:
+def run_chain(capture: Capture, truth: Path) -> None:
     """The chain to the solve as far as it is not fresh; a capture that cannot be taken so far is named, and the others
     go on."""
     try:
-        people.solve_person(capture, truth, "solve", quality)
+        people.solve_person(capture, truth, "solve", "standard")
     except SystemExit as ended:
         print(f"{capture.root.stem}: {ended}", file=sys.stderr, flush=True)
 
@@ -188,7 +181,6 @@ def measure(captures: list[Filmed]) -> tuple[Scores, dict[str, dict[str, Figures
             maps.append(small(answers))
             pictured, mapped = seen_in_pictures(filmed, answers), in_uv(filmed, maps[-1])
             by_capture[filmed.name] = {method: {**pictured[method], **mapped[method]} for method in answers}
-            images.write_srgb(filmed.work / f"{filmed.name}.jpg", side_by_side(filmed, maps[-1]))
             print(f"{filmed.name}: measured", file=sys.stderr, flush=True)
         together, alone = of_person(own, maps)
         for method, figures_of_person in together.items():
@@ -253,18 +245,6 @@ def seen_in_pictures(filmed: Filmed, answers: dict[str, np.ndarray]) -> dict[str
     found = in_pictures(answers, looks(filmed.capture, filmed.truth)[0])
     write_json(kept, {"sources": sources, "figures": found})
     return found
-
-
-def side_by_side(filmed: Filmed, maps: dict[str, np.ndarray]) -> np.ndarray:
-    """The front of the face of every answer at the truth's tone, sRGB, in the order of METHODS."""
-    face = template.mask("face", SIZE) > 0.5
-    rows, columns = (np.flatnonzero(face.any(axis)) for axis in (1, 0))
-    box, tone = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1], maps["true light"][filmed.where].mean(0)
-    shown = [
-        images.linear_to_srgb(np.clip(answer * tone / np.maximum(answer[filmed.where].mean(0), 1e-6), 0, 1))[box]
-        for answer in maps.values()
-    ]
-    return np.hstack(shown)
 
 
 def sections(scores: Scores, by_capture: dict[str, dict[str, Figures]]) -> list[tuple[str, str]]:

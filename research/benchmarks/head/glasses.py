@@ -3,12 +3,10 @@
 """How surely glasses are told: on rendered people whom nothing was learnt from, with and without drawn glasses, and the
 false alarms on real people without.
 
-    python -m research.benchmarks.head.glasses [DATA] [--work FOLDER] [--hdri FOLDER] [--json PATH] [--sheet PATH]
+    python -m research.benchmarks.head.glasses [DATA] [--work FOLDER] [--hdri FOLDER] [--json PATH]
 
 DATA: the folder with photographs/, portraits/, faceolat/, near_ps_human1/, bust/ and lps_sun/, all without glasses;
-each of them is a capture, or several. FOLDER holds the figures' sights as `research.training glasses` keeps them. PATH
-of
---sheet: a picture of rendered people, nobody real, with how sure each is.
+each of them is a capture, or several. FOLDER holds the figures' sights as `research.training glasses` keeps them.
 """
 
 from __future__ import annotations
@@ -19,7 +17,6 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-import cv2
 import numpy as np
 from skimage.data import astronaut
 
@@ -39,7 +36,6 @@ SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
 COMMAND = "python -m research.benchmarks.head.glasses DATA --hdri DATA/hdri --json research/records/glasses.json"
 BARE, SEEN = 3, 4
 """Captures without glasses of each held-out figure, beside one with each kind of them; photographs of a capture."""
-ACROSS = 8  # pictures in a row of the sheet
 FILMED = 12
 """Frames of a film that are looked at."""
 LONG_SIDE = 960
@@ -63,13 +59,11 @@ def look(srgb: np.ndarray) -> float:
     return sureness(srgb, face) if face else float("nan")
 
 
-def rendered(work: Path, hdri: Path | None) -> tuple[dict, list]:
-    """Captures of the held-out figures, each all their views: what becomes of them, and single pictures, by kind. And
-    some pictures to look at."""
+def rendered(work: Path, hdri: Path | None) -> dict:
+    """Captures of the held-out figures, each all their views: what becomes of them, and single pictures, by kind."""
     people, panoramas = training.seeds(0)[1], read_panoramas(hdri)
     training.prepare(people, work, Reporter("glasses"))
     told: dict[str, list] = {kind: [] for kind in (*glasses.KINDS, "none")}
-    shown = []
     for person in people:
         for number, kind in enumerate((*glasses.KINDS, *["none"] * BARE)):
             rng = np.random.default_rng([3, person, number])
@@ -77,8 +71,7 @@ def rendered(work: Path, hdri: Path | None) -> tuple[dict, list]:
             pair = None if kind == "none" else glasses.sample_glasses(sights[0].landmarks, rng, kind)
             pictures = [training.photograph_sight(sight, pair, rng, panoramas) for sight in sights]
             told[kind].append([look(picture) for picture in pictures])
-            shown.append((pictures[number % len(pictures)], told[kind][-1][number % len(pictures)]))
-    return {kind: counted(captures) for kind, captures in told.items()}, shown
+    return {kind: counted(captures) for kind, captures in told.items()}
 
 
 def counted(captures: list[list[float]]) -> dict:
@@ -122,31 +115,12 @@ def filmed(video: Path) -> list[np.ndarray]:
     return [frames[k].astype(np.float32) / 255 for k in np.linspace(0, len(frames) - 1, FILMED).astype(int)]
 
 
-def sheet(judged_pictures: list) -> np.ndarray:
-    rows = []
-    for picture, sure in judged_pictures:
-        tile = cv2.resize(picture, (180, 180), interpolation=cv2.INTER_AREA)
-        cv2.putText(
-            tile,
-            f"{sure:.1f}",
-            (6, 20),
-            cv2.FONT_HERSHEY_SIMPLEX,
-            0.55,
-            (1.0, 1.0, 0.2) if sure > LIKELY_LOG_ODDS else (0.4, 1.0, 1.0),
-            2,
-        )
-        rows.append(tile)
-    rows += [np.zeros_like(rows[0])] * (-len(rows) % ACROSS)
-    return np.vstack([np.hstack(rows[k : k + ACROSS]) for k in range(0, len(rows), ACROSS)])
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=Path, nargs="?", default=SHARED)
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_glasses")
     parser.add_argument("--hdri", type=Path)
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--sheet", type=Path)
     asked = parser.parse_args()
     record = {
         "real": {
@@ -154,12 +128,10 @@ def main() -> None:
             for name, captures in real(asked.data).items()
         }
     }
-    record["rendered"], shown = rendered(asked.work, asked.hdri)
+    record["rendered"] = rendered(asked.work, asked.hdri)
     print(json.dumps(record, indent=1))
     if asked.json:
         figures.write_record(asked.json, "glasses", COMMAND, record)
-    if asked.sheet:
-        images.write_srgb(asked.sheet, sheet(shown))
 
 
 if __name__ == "__main__":

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How well the face parser (core/face/parser.py) tells the parts of people that no training sees.
 
-    python -m research.benchmarks.head.parts [--json OUT.json] [--frames FOLDER] [--weights FILE] python -m
-        research.benchmarks.head.parts --sheet OUT.jpg --pictures FOLDER_OR_FILE ... [--brighter 8] [--weights FILE]
+    python -m research.benchmarks.head.parts [--json OUT.json] [--frames FOLDER] [--weights FILE]
+    python -m research.benchmarks.head.parts --sheet OUT.jpg --pictures FOLDER_OR_FILE ... [--weights FILE]
 
 The four people of research/benchmarks/captures/likenesses.py, each photographed VIEWS times from random sides in lights
 made without panoramas (research/people/lifelike/unlit.py and snapshot.py: rays on the CPU, no Blender); with --frames
@@ -71,11 +71,10 @@ def main() -> None:
     asked.add_argument("--weights", type=Path, default=parser.WEIGHTS)
     asked.add_argument("--sheet", type=Path, help="draw the parts of photographs instead")
     asked.add_argument("--pictures", type=Path, nargs="+", default=[])
-    asked.add_argument("--brighter", type=float, default=1.0, help="of the sheet: a factor on the pictures' values")
     asked = asked.parse_args()
     network = parser.load(asked.weights.resolve())
     if asked.sheet:
-        write_sheet(asked.sheet, asked.pictures, network, asked.brighter)
+        write_sheet(asked.sheet, asked.pictures, network)
         return
     crops = {person.name: list(_crops(photographs(person.seed), network)) for person in LIKENESSES}
     rows = {name: row(found, VIEWS) for name, found in crops.items()}
@@ -163,11 +162,8 @@ def _share(count: int, total: int) -> float | None:
     return float(count / total) if total else None
 
 
-def write_sheet(out: Path, pictures: list[Path], network: ParseNet, brighter: float) -> None:
-    """Draws the crops of photographs, and beside each its parts: in colours, and laid over it.
-
-    out: of the sheet; pictures: files, and folders of them; network: reads the parts; brighter: factor on the pictures'
-    sRGB values."""
+def write_sheet(out: Path, pictures: list[Path], network: ParseNet) -> None:
+    """Draw the crops of photographs (files, or folders of them), their parts in colours, and both in one."""
     rows = []
     for path in [
         path
@@ -175,7 +171,7 @@ def write_sheet(out: Path, pictures: list[Path], network: ParseNet, brighter: fl
         for path in (sorted(each.iterdir()) if each.is_dir() else [each])
         if path.suffix.lower() in ENDINGS
     ]:
-        srgb = np.clip(images.read_srgb(path)[..., :3] * brighter, 0, 1)
+        srgb = images.read_srgb(path)[..., :3]
         face = faces.detect(srgb)
         if face is None:
             print(f"{path.name}: no face was found")

@@ -27,8 +27,6 @@ from pathlib import Path
 from core.capture.stages import NAMES
 from core.worker.client import THREAD_VARIABLES
 
-STAGES_FILES = "what a stage reads of the stages before it"
-
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -37,7 +35,6 @@ def main() -> int:
     parser.add_argument("--only", type=int, metavar="K", help="case number K alone, as of a fault; its output is shown")
     parser.add_argument("--until", choices=NAMES, default=NAMES[-1], help="the last stage that is tried")
     parser.add_argument("--delighter", default="network")
-    parser.add_argument("--kinds", nargs="+", help="of cases, as the table names them")
     parser.add_argument("--json", type=Path, help="where the figures go, such as research/records/hostile.json")
     arguments = parser.parse_args()
     os.environ |= dict.fromkeys(THREAD_VARIABLES, "1")
@@ -46,20 +43,6 @@ def main() -> int:
         return _run(arguments, work)
     finally:
         shutil.rmtree(work, ignore_errors=True)
-
-
-def table(recorded: dict) -> str:
-    """Markdown of a record's figures; the files of all stages are one row."""
-    from ..figures import markdown
-
-    rows: dict[str, Counter] = {}
-    for kind, row in recorded["rows"].items():
-        rows.setdefault(STAGES_FILES if kind.startswith("stage ") else kind, Counter()).update(row)
-    rows["all"] = Counter(recorded["all"])
-    return markdown(
-        ["what was spoiled", "cases", "refused by name", "accepted, with sound results", "faults"],
-        [[kind, *(row[name] for name in ("cases", "refused", "accepted", "faults"))] for kind, row in rows.items()],
-    )
 
 
 def _run(arguments: argparse.Namespace, work: Path) -> int:
@@ -76,14 +59,13 @@ def _run(arguments: argparse.Namespace, work: Path) -> int:
     stock = cases.Stock(undisturbed, work / "stock")
     print(f"A capture was made in {time.monotonic() - began:.0f} s.", flush=True)
     kinds = cases.kinds(undisturbed.names)
-    chosen = [kind for kind in kinds if not arguments.kinds or kind in arguments.kinds]
     rows: dict[str, Counter] = {}
     faulty = []
     for number in range(arguments.count):
         if arguments.only not in (None, number):
             continue
         rng = random.Random(f"{arguments.seed} {number}")
-        kind = rng.choices(chosen, [kinds[name].weight for name in chosen])[0]
+        kind = rng.choices(list(kinds), [kind.weight for kind in kinds.values()])[0]
         place = work / "cases" / str(number)
         case = cases.make_case(kinds[kind], place, stock, rng)
         ended = run.run(case)

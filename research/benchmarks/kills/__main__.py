@@ -29,19 +29,6 @@ from core.worker.client import THREAD_VARIABLES
 
 from . import disk
 
-WORDS = {
-    "moment": "worker killed at a random moment of a random stage",
-    "write": "the same while it writes",
-    "command": "the same, begun as Blender begins it",
-    "mask": "killed while the add-on saves a mask",
-    "deliver": "killed while it delivers over an older delivery",
-    "full": "disk full at a random byte",
-    "asleep": "worker stopped, replaced, awakened",
-    "at_once": "two workers at once",
-    "colmap": "COLMAP killed, or the worker beside it, or both",
-    "all": "all",
-}
-
 MIX = {
     "moment": 12,
     "write": 12,
@@ -66,7 +53,6 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", type=int, metavar="K", help="trial number K alone, as of a fault")
-    parser.add_argument("--kinds", nargs="+", choices=MIX, default=list(MIX))
     parser.add_argument("--until", choices=NAMES, default=NAMES[-1], help="the last stage that is tried")
     parser.add_argument("--delighter", default="network")
     parser.add_argument("--json", type=Path, help="where the figures go, such as research/records/kills.json")
@@ -142,21 +128,9 @@ def _run(arguments: argparse.Namespace, work: Path, watched: tuple[Path, Path], 
     return _tell(found, arguments, figures, private, time.monotonic() - began)
 
 
-def table(recorded: dict) -> str:
-    """Markdown of figures["rows"]."""
-    from ..figures import markdown
-
-    return markdown(
-        ["what happens", "trials", "times that it struck", "without a fault"],
-        [[WORDS[kind], row["trials"], row["struck"], row["faultless"]] for kind, row in recorded["rows"].items()],
-    )
-
-
 def _draw(arguments: argparse.Namespace) -> list[str]:
     """The kinds of all trials: rounds of the mix, each in an order of its own. The same seed gives the same."""
-    allowed = [
-        kind for kind in arguments.kinds if NAMES.index(NEEDS.get(kind, NAMES[0])) <= NAMES.index(arguments.until)
-    ]
+    allowed = [kind for kind in MIX if NAMES.index(NEEDS.get(kind, NAMES[0])) <= NAMES.index(arguments.until)]
     rng, drawn = random.Random(arguments.seed), []
     while len(drawn) < arguments.count:
         turn = [kind for kind in allowed for _ in range(MIX[kind])]

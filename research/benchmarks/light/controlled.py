@@ -3,7 +3,7 @@
 """What an in-the-wild capture loses to a controlled one, and what the solve adds to a studio's even light: the same
 people, their true albedo known.
 
-    python -m research.benchmarks.light.controlled FOLDER [--only NAME ...] [--json OUT.json] [--pictures FOLDER]
+    python -m research.benchmarks.light.controlled FOLDER [--only NAME ...] [--json OUT.json]
 
 FOLDER was made by research/benchmarks/captures/people.py (--places wild flash studio) and its wild captures are solved.
 Rows, each an albedo map in the same UVs:
@@ -34,7 +34,6 @@ import numpy as np
 from core.capture.capture import Capture
 from core.capture.files import write_json
 from core.capture.messages import Problem
-from core.face import template
 from core.face.head import read_head
 from core.imaging import images
 from core.settings.settings import from_json, preset
@@ -68,9 +67,6 @@ def main() -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
     parser.add_argument("--json", type=Path)
-    parser.add_argument(
-        "--pictures", type=Path, help="folder for NAME.jpg: frontal cut of the maps wild, flash, studio, and the truth"
-    )
     asked = parser.parse_args()
     folder = asked.folder.resolve()
     if not folder.is_dir():
@@ -78,8 +74,6 @@ def main() -> int:
     found = {name: rows for name in asked.only if (rows := measure(folder, name))}
     if not found:
         parser.error(f"{folder} holds no capture of research/benchmarks/captures/people.py.")
-    for name in found if asked.pictures else ():
-        images.write_srgb(asked.pictures / f"{name}.jpg", side_by_side(folder, name))
     known = (
         figures.read_record(asked.json.stem, asked.json.parent)["figures"]["people"]
         if asked.json and asked.json.exists()
@@ -144,19 +138,6 @@ def measure(folder: Path, name: str) -> dict[str, dict]:
             print(f"{name}: {row}", file=sys.stderr, flush=True)
         rows[row] = json.loads((kept / f"{row}.json").read_text(encoding="utf-8"))
     return rows
-
-
-def side_by_side(folder: Path, name: str, size: int = 512) -> np.ndarray:
-    """The front of the face in the maps wild, flash, studio and the true one, sRGB; those that are missing are left
-    out."""
-    kept = folder / "controlled" / name
-    paths = [
-        *(kept / f"{row}.png" for row in ("wild", "flash", "studio")),
-        folder / name / "maps" / "diffuse_albedo.png",
-    ]
-    rows, columns = (np.flatnonzero(template.mask("face", size).max(axis) > 0.5) for axis in (1, 0))
-    box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    return np.hstack([images.resize(images.read_srgb(path), size, size)[box] for path in paths if path.is_file()])
 
 
 def means(rows_of_people: dict[str, dict]) -> dict[str, dict]:

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Solved albedo against true albedo, in image space, on facial skin (the paper's protocol for Digital Emily).
 
-    python -m research.benchmarks.maps.albedo_score CAPTURE TRUTH [--texture PICTURE] [--pictures FOLDER] [--json
-        OUT.json]
+    python -m research.benchmarks.maps.albedo_score CAPTURE TRUTH [--json OUT.json]
 
 TRUTH holds capture.mp4, albedo/NNNN.png (sRGB with alpha), face/NNNN.png and, under hard light, shadow/NNNN.png,
 numbered by video frame. Figures per capture, each the mean over the frames with truth that were registered:
@@ -87,25 +86,12 @@ class HeadInView:
         return picture
 
 
-def score_capture(capture: Capture, truth: Path, pictures: Path | None = None, texture: Path | None = None) -> dict:
-    """Scores a solved capture.
-
-    capture: with its maps; truth: folder, laid out as this module says; pictures: folder that takes a picture of each
-    frame, the truth beside ours; texture: any picture in the head's UVs, sRGB, in place of the albedo map. Returns The
-    figures, and "frames_not_registered"."""
+def score_capture(capture: Capture, truth: Path) -> dict:
+    """Score the solved maps of a capture against a truth folder laid out as this module says."""
     albedo = averaged(
-        images.read_srgb(
-            texture or next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists())
-        )
+        images.read_srgb(next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists()))
     )
     seen, missing = looks(capture, truth)
-    if pictures:
-        for look in seen:
-            mask = (look.true.face & look.hit)[..., None]
-            images.write_srgb(
-                pictures / f"{look.true.frame:04d}.jpg",
-                np.hstack([look.true.albedo * mask, look.picture(albedo) * mask]),
-            )
     return {"frames_not_registered": missing, **score_map(albedo, seen)}
 
 
@@ -223,13 +209,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("capture", type=Path)
     parser.add_argument("truth", type=Path)
-    parser.add_argument(
-        "--texture", type=Path, help="score this picture in the head's UVs instead of the solved albedo"
-    )
-    parser.add_argument("--pictures", type=Path, help="folder for truth and result side by side")
     parser.add_argument("--json", type=Path, help="where the figures go, such as research/records/scan_albedo.json")
     arguments = parser.parse_args()
-    ours = score_capture(Capture(arguments.capture), arguments.truth, arguments.pictures, arguments.texture)
+    ours = score_capture(Capture(arguments.capture), arguments.truth)
     scores = {"WildCap": ours, **score_floors(arguments.truth)}
     print(json.dumps(scores, indent=1))
     if arguments.json:

@@ -4,9 +4,9 @@
 the solve, and what it takes for granted.
 
     python -m research.benchmarks.maps.split FOLDER [--truths FOLDER] [--only PREFIX ...] [--beside NAME=FOLDER ...]
-        [--json PATH] python -m research.benchmarks.maps.split FOLDER --only stubbled_below --picture
-        docs/pictures/split.jpg
-                               the parts of that capture, side by side
+        [--json PATH]
+    python -m research.benchmarks.maps.split FOLDER --only stubbled_below --picture docs/pictures/split.jpg
+        the parts of that capture, side by side
 
 FOLDER holds captures as research/benchmarks/delighting/state.py measures them, several lights of each person, solved.
 The closed form alone is a second of work: the texture over the global light that it finds, of each capture alone and of

@@ -2,24 +2,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Geometry and texture alone: textures of the true albedo frames, taken for the albedo, against those same frames.
 
-    python -m research.benchmarks.maps.texture CAPTURE TRUTH [--rows NAME ...] [--steps N] [--size N] [--leave-out N]
-    [--pictures FOLDER]
-
 CAPTURE is registered (cameras, head.obj); TRUTH is laid out as research/benchmarks/maps/albedo_score.py says. Its
-albedo frames go through the `folder` delighter, V = those. Prints one JSON with, per row, the score of albedo_score and
+albedo frames go through the `folder` delighter, V = those. `measure_rows` gives, per row, the score of albedo_score and
 the marks of research/benchmarks/maps/detail.py:
   average      the weighted mean of all views: the minimum of a squared loss
   blend        in bands, not aligned
   aligned      what the stage does by default
-  perceptual   the aligned blend after --steps of the paper's texture loss
+  perceptual   the aligned blend after STEPS of the paper's texture loss
   delit        as aligned, from the capture's own delit frames: what its delighter's errors add
-and "leave_one_out": the aligned texture scored in N frames, each time built without that frame.
+and "leave_one_out": the aligned texture scored in LEFT_OUT frames, each time built without that frame.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import tempfile
 import time
 from collections.abc import Iterable
@@ -44,24 +39,13 @@ from .albedo_score import compare, mean_scores, read_truth
 from .detail import FaceRays, cast_face_rays, centre_rays, marks, mean_of
 
 ROWS = ("average", "blend", "aligned", "perceptual", "delit")
-STEPS = 150
+STEPS, SIZE, LEFT_OUT = 150, 1024, 4
 
 
-def measure_rows(
-    capture: Capture,
-    truth: Path,
-    rows: tuple[str, ...] = ROWS,
-    steps: int = STEPS,
-    size: int = 1024,
-    leave_out: int = 4,
-    pictures: Path | None = None,
-) -> dict:
+def measure_rows(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS) -> dict:
     """Scores the textures of a capture.
 
-    capture: registered; truth: folder, laid out as research/benchmarks/maps/albedo_score.py says; rows: of ROWS; steps:
-    of the perceptual row's optimisation; size: texels along a side; leave_out: how many views are left out, one at a
-    time; 0: none; pictures: folder that takes each row's texture. Returns Row -> figures; "leave_one_out", too. Raises
-    Problem: Where the capture is not registered or no true frame belongs to it."""
+    Raises Problem: Where the capture is not registered or no true frame belongs to it."""
     if not capture.head.is_file():
         raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
     head, report, results = read_head(capture), Reporter("texture"), {}
@@ -69,23 +53,20 @@ def measure_rows(
     if "delit" in rows and any(capture.delit.glob("*.png")):
         results["delit"] = _row(
             "aligned",
-            *texture.observe_all(capture, head, size, report)[:2],
+            *texture.observe_all(capture, head, SIZE, report)[:2],
             looks,
-            steps,
-            pictures and pictures / "delit.jpg",
         )
     with tempfile.TemporaryDirectory() as folder:
         copy = begin_at_delight(capture, Path(folder) / "copy.wildcap")
         delighter = from_json({"delight": {"delighter": "folder", "folder": str(truth.absolute() / "albedo")}})
         run_stages(copy, delighter, "delight")
-        observations, surface, _ = texture.observe_all(copy, head, size, report)
+        observations, surface, _ = texture.observe_all(copy, head, SIZE, report)
         for row in (row for row in rows if row != "delit"):
             try:
-                results[row] = _row(row, observations, surface, looks, steps, pictures and pictures / f"{row}.jpg")
+                results[row] = _row(row, observations, surface, looks)
             except Problem as problem:  # the perceptual network is not everywhere; the other rows are
                 results[row] = {"not_run": f"{problem.problem} {problem.remedy}"}
-        if leave_out:
-            results["leave_one_out"] = _leave_one_out(observations, surface, looks, leave_out)
+        results["leave_one_out"] = _leave_one_out(observations, surface, looks)
     return results
 
 
@@ -106,25 +87,21 @@ def looks_of(capture: Capture, caster: raster.RayCaster, truth: Path) -> dict[st
     return found
 
 
-def _row(
-    row: str, observations: list, surface, looks: dict[str, FaceRays], steps: int, picture: Path | None = None
-) -> dict:
+def _row(row: str, observations: list, surface, looks: dict[str, FaceRays]) -> dict:
     started = time.monotonic()
-    map_ = _texture(row, [replace(o) for o in observations], surface, steps)
+    map_ = _texture(row, [replace(o) for o in observations], surface)
     seconds = time.monotonic() - started
-    if picture:
-        images.write_srgb(picture, map_)
     return {**score(map_, looks.values()), "seconds": round(seconds, 1)}
 
 
-def _texture(row: str, observations: list, surface, steps: int) -> np.ndarray:
+def _texture(row: str, observations: list, surface) -> np.ndarray:
     """A row's map, sRGB [S, S, 3]. The observations are used up."""
     if row == "average":
         linear = weighted_mean([np.exp(o.log_colour) for o in observations], [o.weight for o in observations])
         seen = 1 - np.prod([1 - o.quality for o in observations], axis=0)
         confidence = np.where(surface.covered, seen, 0).astype(np.float32)
     else:
-        settings = from_json({"texture": {"perceptual": steps if row == "perceptual" else 0}})
+        settings = from_json({"texture": {"perceptual": STEPS if row == "perceptual" else 0}})
         built = texture.build(observations, surface, settings, Reporter("texture"), aligned=row != "blend")
         linear, confidence = np.exp(built.log_texture), built.confidence
     return images.linear_to_srgb(texture.fill(linear, confidence, surface.covered))
@@ -149,14 +126,12 @@ def score(map_: np.ndarray, frames: Iterable[FaceRays]) -> dict:
     }
 
 
-def _leave_one_out(observations: list, surface, looks: dict[str, FaceRays], count: int) -> dict:
-    """The aligned texture without one view, scored in that view alone; `count` views in turn, evenly spread."""
+def _leave_one_out(observations: list, surface, looks: dict[str, FaceRays]) -> dict:
+    """The aligned texture without one view, scored in that view alone; LEFT_OUT views in turn, evenly spread."""
     names = [o.name for o in observations if o.name in looks]
-    chosen = [names[i] for i in np.unique(np.linspace(1, max(len(names) - 2, 1), count).round().astype(int))]
+    chosen = [names[i] for i in np.unique(np.linspace(1, max(len(names) - 2, 1), LEFT_OUT).round().astype(int))]
     frames = {
-        name: score(
-            _texture("aligned", [replace(o) for o in observations if o.name != name], surface, 0), [looks[name]]
-        )
+        name: score(_texture("aligned", [replace(o) for o in observations if o.name != name], surface), [looks[name]])
         for name in chosen
     }
     figures = ("psnr", "ssim", "detail", "mole_contrast", "pore_contrast", "pore_correlation")
@@ -168,33 +143,3 @@ def _leave_one_out(observations: list, surface, looks: dict[str, FaceRays], coun
         },
         "frames": frames,
     }
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("capture", type=Path)
-    parser.add_argument("truth", type=Path)
-    parser.add_argument("--rows", nargs="*", choices=ROWS, default=ROWS)
-    parser.add_argument("--steps", type=int, default=STEPS, help="of the perceptual row")
-    parser.add_argument("--size", type=int, default=1024, help="side of the textures")
-    parser.add_argument("--leave-out", type=int, default=4, help="frames that are left out in turn; 0 for none")
-    parser.add_argument("--pictures", type=Path, help="folder for the rows' textures")
-    options = parser.parse_args()
-    print(
-        json.dumps(
-            measure_rows(
-                Capture(options.capture.resolve()),
-                options.truth,
-                tuple(options.rows),
-                options.steps,
-                options.size,
-                options.leave_out,
-                options.pictures,
-            ),
-            indent=1,
-        )
-    )
-
-
-if __name__ == "__main__":
-    main()

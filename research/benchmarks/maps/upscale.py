@@ -3,7 +3,7 @@
 """Four times as many texels of a side: the network against Lanczos on subjects that no training saw, and what the
 frames add.
 
-    python -m research.benchmarks.maps.upscale [--rows enlarging frames cost] [--work DIR] [--json FILE]
+    python -m research.benchmarks.maps.upscale [--work DIR] [--json FILE]
                                  [--picture docs/pictures/upscale.jpg]
 
 enlarging: windows of the benchmark's subjects painted at 4096, reduced to 1024 as they are (plain) and softened as a
@@ -64,9 +64,6 @@ CLOSE = 9.0
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "--rows", nargs="+", choices=("enlarging", "frames", "cost"), default=("enlarging", "frames", "cost")
-    )
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_upscale_benchmark")
     parser.add_argument(
         "--json",
@@ -76,15 +73,10 @@ def main() -> None:
     parser.add_argument("--picture", type=Path, help="close-ups of small map, Lanczos, network and truth side by side")
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
-    found = {}
-    if "enlarging" in arguments.rows:
-        found["enlarging"] = enlarging(arguments.work, arguments.picture)
-    if "frames" in arguments.rows:
-        found["frames"] = from_frames(arguments.work)
-    if "cost" in arguments.rows:
-        # each in a fresh process, whose peak is its own
-        with ProcessPoolExecutor(1, mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:
-            found["cost"] = dict(zip(METHODS, pool.map(cost, METHODS), strict=True))
+    found = {"enlarging": enlarging(arguments.work, arguments.picture), "frames": from_frames(arguments.work)}
+    # each in a fresh process, whose peak is its own
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:
+        found["cost"] = dict(zip(METHODS, pool.map(cost, METHODS), strict=True))
     for name, rows in found.items():
         columns = next(iter(rows.values()))
         print(

@@ -27,22 +27,14 @@ SHOTS = (  # azimuth, height in degrees, distance and the point looked at in met
 )
 
 
-def write_sheet(
-    out: Path, seeds: list[int], work: Path, facekit: Path | None = None, beside: Path | None = None
-) -> None:
-    """Draws one row a person.
-
-    out: of the JPEG; seeds: of the people; work: folder of the renders; what is there is not rendered again; facekit:
-    ICT-FaceKit's folder, of which heads are derived, too; None: other heads; beside: folder of photographs that make
-    the last row."""
+def write_sheet(out: Path, seeds: list[int], work: Path, facekit: Path | None = None) -> None:
+    """Draw a row for each person; renders in the folder `work` are not made again, heads come from ICT-FaceKit if
+    given."""
     rows = []
     for seed in seeds:
         began = time.monotonic()
         rows.append(np.concatenate(_shots(make_figure(seed, facekit=facekit), work / str(seed)), 1))
         print(f"{seed}: {(time.monotonic() - began) / 60:.1f} min", flush=True)
-    if beside:
-        paths = sorted(path for path in beside.iterdir() if path.suffix in (".png", ".jpg"))[: len(SHOTS)]
-        rows.append(np.concatenate([_square(images.read_srgb(path)) for path in paths], 1))
     images.write_srgb(out, np.concatenate(rows), quality=82)
 
 
