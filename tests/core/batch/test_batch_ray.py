@@ -250,7 +250,7 @@ def test_real_stages_on_ray_give_the_bytes_of_a_local_run(tmp_path, monkeypatch)
     tiny_chain.copy_ground(code / "core")
     for room in {path.name for path in (ROOT / "core").iterdir()} - {*tiny_chain.GROUND, "__pycache__"}:
         (code / "core" / room).symlink_to(ROOT / "core" / room)
-    tiny_chain.keep_pace(code)
+    tiny_chain.set_nice(code, 0)
     settings = {
         "device": "cpu",
         "frames": {"max_frames": 12, "long_side": 320, "views": 3},
