@@ -130,6 +130,7 @@ def test_the_gate_waits_for_each_mask(code, tmp_path):
         (("run", "--at-once", 0), "less than one"),
         (("run", "--address", "here"), "--on ray only"),
         (("run", "--cores", 2), "--on ray only"),
+        (("run", "--on", "ray", "--cores", 0), "less than one"),
         (("run", "--on", "ray", "--at-once", 2), "--on local only"),
         (("run", "z"), "no face named"),
     ],
