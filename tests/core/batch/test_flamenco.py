@@ -12,7 +12,6 @@ import re
 import subprocess
 import sys
 from itertools import pairwise
-from pathlib import Path
 
 import dukpy
 import pytest

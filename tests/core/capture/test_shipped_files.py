@@ -58,7 +58,9 @@ def test_every_shipped_file_that_is_cut_changed_or_gone_is_named(core):
         assert str(path) in refusal.value.problem and refusal.value.remedy == shipped_files.AGAIN
     faults = shipped_files.find_faults(core)
     assert len(faults) == len(damages)
-    assert all(str(path) in fault and word in fault for fault, (path, word) in zip(faults, damages.items(), strict=True))
+    assert all(
+        str(path) in fault and word in fault for fault, (path, word) in zip(faults, damages.items(), strict=True)
+    )
     (core / "head.obj").write_text("somebody else's")
     shipped_files.require_whole(core / "head.obj")
 

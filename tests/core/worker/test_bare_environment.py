@@ -98,9 +98,10 @@ def test_pip_comes_from_the_mirror_that_pip_is_set_up_for(tmp_path, wheels, unse
     threading.Thread(target=server.serve_forever, daemon=True).start()
     (tmp_path / "pip.conf").write_text(f"[global]\nindex-url = http://127.0.0.1:{server.server_port}/index\n")
     monkeypatch.setenv("PIP_CONFIG_FILE", str(tmp_path / "pip.conf"))
-    assert hashlib.sha256(pip_source.fetch(tmp_path / "requirements")).hexdigest() in (
-        tmp_path / "requirements" / "locks" / "pip.txt"
-    ).read_text()
+    assert (
+        hashlib.sha256(pip_source.fetch(tmp_path / "requirements")).hexdigest()
+        in (tmp_path / "requirements" / "locks" / "pip.txt").read_text()
+    )
     (pages / "index.html").write_text("")
     with pytest.raises(Problem, match=f"The package index has no {PIP}"):
         pip_source.fetch(tmp_path / "requirements")

@@ -91,5 +91,7 @@ def test_from_the_question_through_a_cancel_to_a_solve_and_removed_again(addon, 
     assert not solver.exists() and addon("preferences").python() is None and problems.of("") is None
     print(*told, *freed, sep="\n")
     print(f"{len(plan.packages)} packages, {plan.disk / 1e9:.2f} GB planned, {size / 1e9:.2f} GB on disk")
-    print(f"ask {asking_s:.0f}, cancel {cancel_s:.1f}, install {install_s:.0f}, solve {solve_s:.0f}, remove {remove_s:.0f} s")
+    print(
+        f"ask {asking_s:.0f}, cancel {cancel_s:.1f}, install {install_s:.0f}, solve {solve_s:.0f}, remove {remove_s:.0f} s"
+    )
     assert size == pytest.approx(plan.disk, rel=0.2)

@@ -11,7 +11,6 @@ import pytest
 
 from core.__main__ import main
 from core.capture import sample_head
-from core.capture.capture import Capture
 from core.capture.messages import Done, Failed, StageDone
 from core.imaging import images
 from core.stages.solve import self_test as tool
@@ -123,7 +122,9 @@ class TestInBlender:
         assert jobs.of("").goal == "test" and folders[0].is_dir()
         jobs.poll()
         tested = addon("preferences").get().tested
-        assert all(figure in tested for figure in ("33.2", "32.5", "41 s")) and addon("problems").of("").problem == tested
+        assert (
+            all(figure in tested for figure in ("33.2", "32.5", "41 s")) and addon("problems").of("").problem == tested
+        )
         assert not folders[0].exists() and jobs.of("") is None
         addon("preferences").set_python(tmp_path / "another" / "python")
         assert addon("preferences").get().tested == "", "another solver was not tested"
