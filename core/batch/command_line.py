@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m core batch: plan, run, status, retry, accept, review, commands, task. Standard library only; Ray is
-imported where a batch runs on it."""
+"""python -m core batch: plan, run, status, retry, accept, review, commands, task.
+
+Standard library only; Ray is imported only where a batch runs on it.
+"""
 
 from __future__ import annotations
 
@@ -33,12 +35,12 @@ from .state import DONE, STOPPED, WAITING, derive_state
 from .task import ROOT, run_task
 
 CORES_PER_TASK = 2
-"""That a task takes of a node of Ray's."""
+"""Cores that a task takes on a Ray node."""
 NONE = "none"
 
 
 def add_commands(commands) -> None:
-    """Adds `batch` to the subparsers of `python -m core`."""
+    """Add `batch` to the subparsers of `python -m core`."""
     many = commands.add_parser(
         "batch", help="many faces: plan them from a table, run them here or on a farm, review them"
     )
@@ -156,28 +158,27 @@ def _plan(options: argparse.Namespace) -> int:
 
 
 def _with_options(batch: Batch, options: argparse.Namespace) -> Batch:
-    """The batch with the options that are named; the others stay as they were planned. Raises Problem."""
-    deliver, folder = dict(batch.deliver or {}), {"folder": str(options.to.absolute())} if options.to else {}
+    """Return the batch with the given options; others stay as they were planned. Raises Problem."""
+    deliver = dict(batch.deliver or {})
     if options.deliver:
         deliver = {**deliver, "preset": options.deliver} if options.deliver != NONE else {}
-    if folder and not deliver:
+    if options.to and not deliver:
         raise Problem("--to goes with --deliver only.", "Add --deliver PRESET, or leave --to out.")
-    deliver |= folder
+    if options.to:
+        deliver["folder"] = str(options.to.absolute())
     settings.from_json({"deliver": deliver})
     blender = batch.blender if options.blender is None else "" if options.blender == NONE else options.blender
     return replace(batch, gate=options.gate or batch.gate, deliver=deliver or None, blender=blender)
 
 
 def _refuse_strangers(root: Path) -> None:
-    """Raises Problem for a folder that holds something and is no batch."""
+    """Raise Problem for a folder that is neither empty nor a batch."""
     try:
-        strangers = (
-            sorted(path.name for path in root.iterdir()) if root.is_dir() and not (root / NAME).is_file() else []
-        )
+        names = sorted(path.name for path in root.iterdir()) if root.is_dir() else []
     except OSError as error:
         raise storage_problem(error, root) from error
-    if strangers:
-        raise Problem(f"{root} is no batch: it holds {strangers[0]}.", "Name a new folder, and it will be made.")
+    if names and not (root / NAME).is_file():
+        raise Problem(f"{root} is not a batch (it contains {names[0]}).", "Name a new folder, and it will be made.")
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -207,7 +208,7 @@ def _run(options: argparse.Namespace) -> int:
 
 @contextlib.contextmanager
 def _held(batch: Batch) -> Iterator[None]:
-    """Holds the batch's lease. Raises Problem, also where its folder cannot be written."""
+    """Hold the batch's lease. Raises Problem."""
     with contextlib.ExitStack() as stack:
         try:
             stack.enter_context(lease.hold(batch.root, _tell, "batch"))
@@ -243,10 +244,8 @@ def _status(options: argparse.Namespace) -> int:
     with contextlib.suppress(Problem):
         holder = lease.present_holder(batch.root / "lock")
         if holder:
-            print(
-                f"The batch is being run on {str(holder['host']).partition('/')[0]} (process {holder['pid']}, since "
-                f"{holder['since']})."
-            )
+            machine = str(holder["host"]).partition("/")[0]
+            print(f"The batch is being run on {machine} (process {holder['pid']}, since {holder['since']}).")
     return 0
 
 
@@ -277,14 +276,14 @@ def _commands(options: argparse.Namespace) -> int:
 
 
 def _task(options: argparse.Namespace) -> int:
-    """Exit codes as for `run`: 0, 2 for a problem, 130 after Ctrl-C."""
+    """Return 0, 2 for a problem, or 130 after Ctrl-C, as `run` does."""
     batch, stopped = read_batch(options.batch), []
     face, group, line = batch.face(options.name), group_named(options.group), ProgressLine()
 
     def stop(number, frame) -> None:
         stopped.append(number)
 
-    for each in (signal.SIGINT, signal.SIGTERM):  # a scheduler ends a task by either
+    for each in (signal.SIGINT, signal.SIGTERM):  # schedulers send either
         signal.signal(each, stop)
     final = run_task(
         batch, face, group, lambda message: print_message(message, face.capture, line), lambda: bool(stopped)
@@ -292,9 +291,8 @@ def _task(options: argparse.Namespace) -> int:
     if isinstance(final, Failed):
         line.clear()
         raise Problem(final.problem, final.remedy)
-    line.keep(
-        "Cancelled; finished stages are kept."
-        if isinstance(final, Cancelled)
-        else f"{face.name}: {group.label.lower()} done"
-    )
-    return 130 if isinstance(final, Cancelled) else 0
+    if isinstance(final, Cancelled):
+        line.keep("Cancelled; finished stages are kept.")
+        return 130
+    line.keep(f"{face.name}: {group.label.lower()} done")
+    return 0

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The commands about a capture that is there, and what people bring into it by hand: python -m core status, delete,
-report-problem, mask and landmarks. Standard library only."""
+"""Commands about an existing capture: python -m core status, delete, report-problem, mask and landmarks.
+
+Standard library only.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def add_commands(commands) -> None:
-    """Adds them to the subparsers of `python -m core`."""
+    """Add the commands to the subparsers of `python -m core`."""
     add_command(commands, "status", _status, "say which stages of a capture are done", "CAPTURE")
     gone = add_command(
         commands,
@@ -58,7 +60,7 @@ def add_commands(commands) -> None:
 
 
 def _status(options: argparse.Namespace) -> int:
-    """States under the settings of the last job."""
+    """Print the stages' states under the settings of the last job."""
     capture = Capture(options.capture)
     if not capture.root.is_dir():
         raise Problem(

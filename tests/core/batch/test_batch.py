@@ -111,7 +111,7 @@ def test_the_gate_waits_for_each_mask(code, tmp_path):
     assert core(code, "batch", "run", batch.root).stdout.splitlines()[-1] == "2 faces: 2 waiting for the artist"
     assert states(batch) == {"a": WAITING, "b": WAITING} and core(code, "batch", "commands", batch.root).stdout == ""
     refused = core(code, "batch", "task", batch.root, "a", "solve")
-    assert refused.returncode == 2 and "waits to be looked at" in refused.stderr
+    assert refused.returncode == 2 and "waits for review" in refused.stderr
     assert core(code, "batch", "accept", batch.root, "a").returncode == 0
     assert core(code, "batch", "run", batch.root).stdout.splitlines()[-1] == "2 faces: 1 done, 1 waiting for the artist"
     capture = batch.face("a").capture

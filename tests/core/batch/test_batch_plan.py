@@ -190,7 +190,7 @@ def test_planned_again_it_keeps_the_options_that_are_left_out(folder):
 def test_what_is_no_batch_is_left_alone(folder, capsys):
     new = ["plan", str(folder), str(folder / "b")]
     for words, said in (
-        (["plan", str(folder), str(folder)], "is no batch: it holds"),
+        (["plan", str(folder), str(folder)], "is not a batch"),
         ([*new, "--to", "x"], "--deliver only"),
         ([*new, "--deliver", "lunch"], "deliver.preset"),
         (["status", str(folder)], "no batch at"),

@@ -181,7 +181,7 @@ def test_a_face_whose_node_is_given_up_is_begun_elsewhere(tmp_path):
         stranger = lease.holder(batch.faces[0].capture.lock)["token"]
         run.advance()
         first = dict(run._tasks)
-        assert [group for _, group, _ in first.values()] == list(GROUPS) and begin.call_args.args[-1] == stranger
+        assert [group for _, group in first.values()] == list(GROUPS) and begin.call_args.args[-1] == stranger
         for node, left in (("here", False), ("silent", True)):
             run._places = {"a": node}
             run._leave_dead_nodes({"a": batch.faces[0]})
