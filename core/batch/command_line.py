@@ -152,8 +152,8 @@ def _plan(options: argparse.Namespace) -> int:
         write_batch(replace(batch, faces=(*kept, *faces)))
     for fault in faults:
         print(f"{fault.problem} {fault.remedy}", file=sys.stderr)
-    said = f"{len(faces)} face{'' if len(faces) == 1 else 's'} planned in {root}"
-    print(said + (f", {len(kept)} of before kept" if kept else "") + (f", {len(faults)} left out" if faults else ""))
+    summary = f"{len(faces)} face{'' if len(faces) == 1 else 's'} planned in {root}"
+    print(summary + (f", {len(kept)} of before kept" if kept else "") + (f", {len(faults)} left out" if faults else ""))
     return 2 if faults else 0
 
 

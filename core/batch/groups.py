@@ -17,8 +17,7 @@ DELIVER = "deliver"
 
 @dataclass(frozen=True)
 class StageGroup:
-    """Stages `first` to `last`, the free memory they need (that of the largest stage, rounded up), and whether a GPU
-    helps."""
+    """Stages `first` to `last`, the free memory that the largest needs, and whether a GPU helps."""
 
     name: str
     label: str

@@ -101,13 +101,13 @@ def _outlast(capture: Capture, stranger: str, stopped: list) -> None:
 
 def _listener(batch: Batch, name: str, say: Callable[[str], None]) -> Callable[[Message], None]:
     """Return a function that passes a worker's progress on once in a while and logs the stages."""
-    said = [0.0]
+    sent = [0.0]  # time of the last line
     account = batch.root / LOGS / f"{socket.gethostname()}.jsonl"
 
     def hear(message: Message) -> None:
         begins = isinstance(message, Progress) and (message.done, message.text) == (0, "Starting")
-        if begins or isinstance(message, Progress) and time.monotonic() - said[0] > EVERY_S:
-            said[0] = time.monotonic()
+        if begins or isinstance(message, Progress) and time.monotonic() - sent[0] > EVERY_S:
+            sent[0] = time.monotonic()
             say(to_line(message))
         if begins or isinstance(message, StageDone) and not message.skipped:
             finished = isinstance(message, StageDone)

@@ -29,8 +29,10 @@ PLAN_AGAIN = "Plan the batch again from its table: its captures keep what they h
 
 @dataclass(frozen=True)
 class BatchFace:
-    """A video or a folder of photographs, `source`, the root of its capture, and settings ({stage: {name: value}, seed,
-    device}) over the preset `quality`. Paths are absolute."""
+    """A face with absolute paths of its source, a video or a folder of photographs, and of its capture.
+
+    `settings` ({stage: {name: value}, seed, device}) lie over the preset `quality`.
+    """
 
     name: str
     source: Path
@@ -49,8 +51,7 @@ class BatchFace:
 
 @dataclass(frozen=True)
 class Batch:
-    """`deliver` holds the settings of each face's delivery, None for no delivery; `blender` is the program that renders
-    contact sheets, '' for none."""
+    """A batch; `deliver` holds the settings of deliveries, or None, `blender` the renderer of contact sheets, or ''."""
 
     root: Path
     faces: tuple[BatchFace, ...]

@@ -89,8 +89,7 @@ STATES = {DONE: "done", TO_DO: "to do", WORKING: "being worked on", WAITING: "wa
 
 @dataclass(frozen=True)
 class ReviewRow:
-    """One face: values and ranks (share of the others that are better, [0, 1]) by a measure's label, and findings as
-    `report.findings` gives them."""
+    """One face: values and ranks (share of the others that are better, [0, 1]) by a measure's label, and findings."""
 
     face: BatchFace
     state: FaceState
@@ -266,7 +265,7 @@ def _thumbnails(capture: Capture, link: str) -> str:
     if not pictures:
         stage, pattern, words = FIRST_PICTURE
         pictures = [(stage, path, words) for path in sorted(capture.pictures.glob(pattern))[:1]]
-    shown = ""
+    markup = ""
     for stage, path, words in pictures:
         with contextlib.suppress(Problem, OSError):  # a damaged picture is left out
             content, aspect = shrink(path)
@@ -275,8 +274,8 @@ def _thumbnails(capture: Capture, link: str) -> str:
                 f'src="data:image/jpeg;base64,{base64.b64encode(content).decode("ascii")}">'
             )
             picture = f'<a href="{link}{f"#{stage}" if stage else ""}">{picture}</a>' if link else picture
-            shown += f'<div style="flex:{aspect:.3f} 1 0;max-width:{aspect * TALLEST_REM:.2f}rem">{picture}</div>'
-    return shown
+            markup += f'<div style="flex:{aspect:.3f} 1 0;max-width:{aspect * TALLEST_REM:.2f}rem">{picture}</div>'
+    return markup
 
 
 def shrink(path: Path) -> tuple[bytes, float]:

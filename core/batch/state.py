@@ -24,8 +24,7 @@ SHEET = "contact_sheet.png"
 
 @dataclass(frozen=True)
 class FaceState:
-    """One of the five states, with the task that is next, works or has stopped (None if all are done), the problem that
-    stopped it, and the machine that works on it."""
+    """One of the five states, with its task (None if all are done), the problem that stopped it, and its machine."""
 
     state: str
     group: StageGroup | None = None

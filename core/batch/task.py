@@ -75,8 +75,7 @@ def _follow(
     environment: dict[str, str],
     job: Path,
 ) -> Message:
-    """Run a job and return its final message. A worker that dies is restarted once: a task beside it may have taken the
-    memory."""
+    """Run a job and return its final message; restart once a worker that dies, perhaps for want of memory."""
     final, died = _run_worker(capture, hear, cancelled, environment, job)
     if died:
         hear(Log(f"{final.problem} It is started once more."))

@@ -23,14 +23,14 @@ ROOT = Path(__file__).resolve().parents[2]
 def add_commands(commands) -> None:
     """Add the commands to the subparsers of `python -m core`."""
     add_command(commands, "status", _status, "say which stages of a capture are done", "CAPTURE")
-    gone = add_command(
+    delete = add_command(
         commands,
         "delete",
         _delete,
         "delete a face: all that WildCap wrote of it; without --yes, list what would go and what would stay",
         "CAPTURE",
     )
-    gone.add_argument("--yes", action="store_true", help="delete it, for good")
+    delete.add_argument("--yes", action="store_true", help="delete it, for good")
     about = add_command(
         commands,
         "report-problem",

@@ -59,10 +59,10 @@ def add_assignments(parser: argparse.ArgumentParser, command: str) -> None:
 
 
 def read_options(options: argparse.Namespace, command: str) -> dict:
-    """Return the settings of a command line as a job has them, {stage: {name: value}, seed, device}, with absolute paths.
+    """Return the settings of a command line as a job has them: {stage: {name: value}, seed, device}.
 
-    --set and flags lie over the file. Raises Problem for an invalid setting or value, an unreadable file, and two values
-    for one setting.
+    --set and flags lie over the file; paths are absolute. Raises Problem for an invalid setting or value, an unreadable
+    file, and two values for one setting.
     """
     settings = read_file(options.settings_file) if options.settings_file else {}
     overrides: dict[str, tuple[str, object]] = {}

@@ -60,18 +60,19 @@ def verify(python: Path, requirements: Path, importing: bool = False, task: Back
 
 
 def survey(python: Path, requirements: Path, importing: bool = False, task: BackgroundTask | None = None) -> dict:
-    """Examine a Python: {"python": [major, minor], "versions": {package: version or None}, "opencv": [packages],
-    "errors": {module: text}, "device": "cpu", "cuda", "mps" or "", "reason"}.
+    """Examine a Python.
 
-    With `importing` (some ten seconds) every module is imported, and the device proven by a pass of the network. Raises
-    Problem if the Python cannot be run, and CancelledError if `task` is cancelled.
+    Returns {"python": [major, minor], "versions": {package: version or None}, "opencv": [packages], "errors": {module:
+    text}, "device": "cpu", "cuda", "mps" or "", "reason"}. With `importing` (some ten seconds) every module is imported,
+    and the device proven by a pass of the network. Raises Problem if the Python cannot be run, and CancelledError if
+    `task` is cancelled.
     """
     modules = [MODULES.get(name, name) for name in required(requirements)] if importing else []
     root = str(Path(requirements).parent) if importing else ""
     code = _SURVEY % {"names": list(required(requirements)), "modules": modules, "root": root}
-    printed = answer(python, code, SURVEY_S) if task is None else _answer_in(task, python, code)
+    output = answer(python, code, SURVEY_S) if task is None else _answer_in(task, python, code)
     try:
-        return json.loads(printed.splitlines()[-1])
+        return json.loads(output.splitlines()[-1])
     except (ValueError, IndexError):
         raise Problem(
             f"{python} is not a working Python.", "Choose another Python, or install the solver again."
@@ -147,7 +148,7 @@ def removal(folder: Path) -> BackgroundTask:
 def alone_in(folder: Path, task: BackgroundTask) -> Iterator[None]:
     """Hold the lease of an environment's folder, a file beside it, against other installations and removals.
 
-    A holder in this process has been cancelled and is waited for. Raises Problem naming another one, and CancelledError.
+    A holder in this process was cancelled and is waited for. Raises Problem naming any other, and CancelledError.
     """
     path, here = folder.with_name(f"{folder.name}.wildcap-install.lock"), processes.identify_process().items()
     while here <= (lease.holder(path) or {}).items():
@@ -195,7 +196,7 @@ print(json.dumps({"python": sys.version_info[:2], "versions": versions, "opencv"
 
 
 def answer(python: str | Path, code: str, timeout_s: float = 20) -> str:
-    """Return what `python` prints for `code`, '' if it cannot be run. Isolated from modules in the working directory."""
+    """Return what `python` prints for `code`, '' if it cannot be run; isolated from the working directory."""
     flags = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {}
     try:
         result = subprocess.run(

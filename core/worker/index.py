@@ -46,10 +46,10 @@ def plan_installation(
     say: Callable[[float, float, str], None] = lambda *_: None,
     wheels: Path | None = None,
 ) -> InstallationPlan:
-    """Plan an installation from the Python `base`, for a device ("cpu", "cuda" or "apple") and one of pip_steps.SOURCES.
+    """Plan an installation from the Python `base`, for a device ("cpu", "cuda", "apple") and one of pip_steps.SOURCES.
 
-    `run` runs a command and returns its exit code and last error. Raises Problem if there is no solver for this machine,
-    or if the index cannot be reached or lacks a package.
+    `run` runs a command and returns its exit code and last error. Raises Problem if there is no solver for this
+    machine, or if the index cannot be reached or lacks a package.
     """
     lock = pip_steps.lock_of(base, requirements)
     wheels = Path(wheels) if source == "folder" else None
@@ -79,8 +79,8 @@ def plan_installation(
                 f"The package index did not answer as expected ({pip_steps.shorten(error)}).",
                 "Check the network connection, and try again.",
             )
-    known = locks.known_sizes(requirements, lock.name)
-    sizes = [known[f"{name}=={version}"] for name, (version, _) in packages.items()]
+    known_sizes = locks.known_sizes(requirements, lock.name)
+    sizes = [known_sizes[f"{name}=={version}"] for name, (version, _) in packages.items()]
     hosts = sorted({urllib.parse.urlsplit(url).hostname or "this disk" for _, url in packages.values()})
     return InstallationPlan(
         {name: version for name, (version, _) in packages.items()},
