@@ -15,7 +15,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 from ..capture.files import write_json
@@ -32,17 +32,6 @@ EVERY_S = 1.0
 """Shortest time between two writes of progress.json."""
 
 
-@dataclass
-class Tally:
-    """Outcome of a run."""
-
-    ended: dict[str, str] = field(default_factory=dict)  # face -> DONE, WAITING, STOPPED or CANCELLED
-    worked: set[str] = field(default_factory=set)  # faces for which a task was run
-
-    def count(self, state: str) -> int:
-        return sum(ended == state for ended in self.ended.values())
-
-
 class Board:
     """Thread-safe output of a run: lines through `tell`, and progress.json."""
 
@@ -52,7 +41,8 @@ class Board:
         self._lock = threading.Lock()
         self._written = 0.0
         self._began = time.monotonic()
-        self.tally = Tally()
+        self.ended: dict[str, str] = {}  # face -> DONE, WAITING, STOPPED or CANCELLED
+        self.worked: set[str] = set()  # faces for which a task was run
 
     def say(self, face: BatchFace, words: str) -> None:
         with self._lock:
@@ -68,16 +58,16 @@ class Board:
 
     def end(self, face: BatchFace, state: str, words: str) -> None:
         self._working.pop(face.name, None)
-        self.tally.ended[face.name] = state
+        self.ended[face.name] = state
         left = self.left_s()
         estimate = f", about {max(1, round(left / 60))} min left" if left else ""
-        self.say(face, f"{words} ({len(self.tally.ended)} of {self._faces}{estimate})")
+        self.say(face, f"{words} ({len(self.ended)} of {self._faces}{estimate})")
         self.write(now=True)
 
     def left_s(self) -> float | None:
         """Estimate the time left from the faces that this run worked on."""
-        paced = len(self.tally.worked & self.tally.ended.keys())
-        return (time.monotonic() - self._began) / paced * (self._faces - len(self.tally.ended)) if paced else None
+        paced = len(self.worked & self.ended.keys())
+        return (time.monotonic() - self._began) / paced * (self._faces - len(self.ended)) if paced else None
 
     def write(self, now: bool = False) -> None:
         """Write progress.json, at most every EVERY_S unless `now`."""
@@ -85,7 +75,7 @@ class Board:
             if not now and time.monotonic() - self._written < EVERY_S:
                 return
             self._written = time.monotonic()
-            ended, working = len(self.tally.ended), dict(self._working)
+            ended, working = len(self.ended), dict(self._working)
             progress = {"ended": ended, "of": self._faces, "left_s": self.left_s(), "working": working}
             with contextlib.suppress(Problem):  # captures may lie on another disk than a full one
                 write_json(self._batch.root / PROGRESS, progress)
@@ -98,8 +88,8 @@ def run_local(
     retry: bool,
     tell: Callable[[str], None],
     until: str | None = None,
-) -> Tally:
-    """Run the remaining tasks of faces, `at_once` faces at a time, and return how each ended.
+) -> dict[str, str]:
+    """Run the remaining tasks of faces, `at_once` at a time; return face -> DONE, WAITING, STOPPED or CANCELLED.
 
     The caller holds the batch's lease. `retry` tries faces that have stopped again, `tell` takes lines about faces,
     `until` names the last task. KeyboardInterrupt or the file `stop` ends the run; finished stages are kept.
@@ -127,7 +117,7 @@ def run_local(
                 each.cancel()
     forget_stop(batch.root)
     board.write(now=True)
-    return board.tally
+    return board.ended
 
 
 def ask_to_stop(root: Path) -> None:
@@ -180,7 +170,7 @@ def _run_face(
             return
         retry = retry and not state.problem
         began, group = time.monotonic(), state.group
-        board.tally.worked.add(face.name)
+        board.worked.add(face.name)
         final = run_task(batch, face, group, lambda message: board.hear(face, message), cancelled, threads)
         final = check_result(batch, face, group, final)
         label = group.label.lower()

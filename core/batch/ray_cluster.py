@@ -18,7 +18,7 @@ from ..capture import lease
 from ..capture.hashes import hash_file
 from ..capture.messages import Problem, from_line
 from .groups import GROUPS, StageGroup, groups_until
-from .local import CANCELLED, EVERY_S, Board, Tally, forget_stop, is_asked_to_stop, next_task
+from .local import CANCELLED, EVERY_S, Board, forget_stop, is_asked_to_stop, next_task
 from .ray_connection import connect
 from .record import NAME, Batch, BatchFace
 from .state import DONE, STOPPED, WORKING
@@ -42,7 +42,7 @@ def run_on_ray(
     until: str | None,
     address: str | None,
     cores: int,
-) -> Tally:
+) -> dict[str, str]:
     """Run the remaining tasks of faces on a cluster, each with `cores`, as `run_local` does on this machine.
 
     `address` is HOST:PORT of the head node or "auto"; None makes a cluster of this machine. Raises Problem if there is
@@ -59,7 +59,7 @@ def run_on_ray(
         finally:
             run.end()
             forget_stop(batch.root)
-    return run.board.tally
+    return run.board.ended
 
 
 class _Run:
@@ -126,7 +126,7 @@ class _Run:
         except self._ray.exceptions.RayError as error:
             words = f"Ray gave the task up ({type(error).__name__}). Run the batch again: finished stages are kept."
             outcome = {"state": STOPPED, "words": words}
-        self.board.tally.worked.add(face.name)
+        self.board.worked.add(face.name)
         self._places.pop(face.name, None)
         label, words = group.label.lower(), outcome["words"]
         if outcome["state"] == DONE:

@@ -63,16 +63,19 @@ def survey(python: Path, requirements: Path, importing: bool = False, task: Back
     """Examine a Python.
 
     Returns {"python": [major, minor], "versions": {package: version or None}, "opencv": [packages], "errors": {module:
-    text}, "device": "cpu", "cuda", "mps" or "", "reason"}. With `importing` (some ten seconds) every module is imported,
-    and the device proven by a pass of the network. Raises Problem if the Python cannot be run, and CancelledError if
-    `task` is cancelled.
+    text}, "device": "cpu", "cuda", "mps" or "", "reason"}. With `importing` (some ten seconds) every module is
+    imported, and the device proven by a pass of the network. Raises Problem if the Python cannot be run, and
+    CancelledError if `task` is cancelled.
     """
     modules = [MODULES.get(name, name) for name in required(requirements)] if importing else []
     root = str(Path(requirements).parent) if importing else ""
     code = _SURVEY % {"names": list(required(requirements)), "modules": modules, "root": root}
-    output = answer(python, code, SURVEY_S) if task is None else _answer_in(task, python, code)
+    task = task or BackgroundTask("survey", lambda task: None)
+    lines: list[str] = []
+    with contextlib.suppress(OSError):
+        task.run([python, "-I", "-c", code], lines.append, SURVEY_S)
     try:
-        return json.loads(output.splitlines()[-1])
+        return json.loads([line for line in lines if line.startswith("{")][-1])  # libraries may print, too
     except (ValueError, IndexError):
         raise Problem(
             f"{python} is not a working Python.", "Choose another Python, or install the solver again."
@@ -158,14 +161,6 @@ def alone_in(folder: Path, task: BackgroundTask) -> Iterator[None]:
         yield
 
 
-def _answer_in(task: BackgroundTask, python: Path, code: str) -> str:
-    """Return the lines of JSON that `python` prints for `code`, until the task is cancelled."""
-    lines: list[str] = []
-    with contextlib.suppress(OSError):
-        task.run([python, "-I", "-c", code], lines.append, SURVEY_S)
-    return "".join(line for line in lines if line.startswith("{"))
-
-
 _SURVEY = """
 import importlib, json, sys
 from importlib import metadata
@@ -195,7 +190,7 @@ print(json.dumps({"python": sys.version_info[:2], "versions": versions, "opencv"
 """
 
 
-def answer(python: str | Path, code: str, timeout_s: float = 20) -> str:
+def answer(python: str | Path, code: str) -> str:
     """Return what `python` prints for `code`, '' if it cannot be run; isolated from the working directory."""
     flags = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {}
     try:
@@ -203,7 +198,7 @@ def answer(python: str | Path, code: str, timeout_s: float = 20) -> str:
             [str(python), "-I", "-c", code],
             capture_output=True,
             text=True,
-            timeout=timeout_s,
+            timeout=20,
             stdin=subprocess.DEVNULL,
             env=switchlight_api.environment_without_key(),
             **flags,

@@ -52,7 +52,7 @@ def installation(
                 place.mkdir(parents=True, exist_ok=True)
             with alone_in(folder, task), open(log, "w", encoding="utf-8") as file:
                 hear = _listener(task, file, expected)
-                _Installation(task, folder, requirements, base or base_python(), chosen, hear, log).run()
+                _install(task, hear, folder, requirements, base or base_python(), chosen, log)
         except OSError as error:
             raise storage_problem(error, folder) from error
 
@@ -90,50 +90,45 @@ def base_python() -> Path:
     return python
 
 
-@dataclass(frozen=True)
-class _Installation:
-    """A running installation; `hear` takes each line of pip's output."""
+def _install(
+    task: BackgroundTask,
+    hear: Callable[[str], None],
+    folder: Path,
+    requirements: Path,
+    base: Path,
+    chosen: PackageSource,
+    log: Path,
+) -> None:
+    """Make or continue an environment; `hear` takes each line of pip's output. Raises Problem."""
+    lock = lock_of(base, requirements)
+    locks.check_path(lock, folder, limited=os.name == "nt")
+    made_for = " ".join((chosen.compute, chosen.source, lock.name))
 
-    task: BackgroundTask
-    folder: Path
-    requirements: Path
-    base: Path
-    chosen: PackageSource
-    hear: Callable[[str], None]
-    log: Path
+    def run(command) -> tuple[int, str]:
+        return task.run(command, hear)
 
-    def run(self) -> None:
-        lock = lock_of(self.base, self.requirements)
-        locks.check_path(lock, self.folder, limited=os.name == "nt")
-        made_for = " ".join((self.chosen.compute, self.chosen.source, lock.name))
-        continued = _begun(self.folder, made_for)
-        problems = self._bring(lock, made_for, anew=not continued)
-        # pip trusts an environment's metadata although files may be missing or damaged
-        if problems and continued:
-            problems = self._bring(lock, made_for, anew=True)
-        if problems:
-            raise Problem(problems[0], f"Install again; the log is {self.log}.")
-
-    def _bring(self, lock: locks.Lock, made_for: str, anew: bool) -> list[str]:
+    def bring(anew: bool) -> list[str]:
         """Run all steps once, and return what is wrong afterwards."""
-        task, folder, requirements, chosen = self.task, self.folder, self.requirements, self.chosen
-
-        def run(command) -> tuple[int, str]:
-            return task.run(command, self.hear)
-
         if anew:
             task.say(0, 100, "making the solver's folder")
             folder.mkdir(parents=True, exist_ok=True)
             (folder / COMPUTE_FILE).write_text("", encoding="utf-8")
-            bare_environment.make(folder, self.base, requirements, run, chosen.wheels, keep=COMPUTE_FILE)
+            bare_environment.make(folder, base, requirements, run, chosen.wheels, keep=COMPUTE_FILE)
             (folder / COMPUTE_FILE).write_text(made_for, encoding="utf-8")
         pip = [python_of(folder), *INSTALL, "--progress-bar", "off"]
-        todo = plan_steps(requirements, lock, chosen.compute, chosen.source, folder, chosen.wheels)
-        code, error = carry_out(todo, lambda words: run([*pip, *words]))
+        steps = plan_steps(requirements, lock, chosen.compute, chosen.source, folder, chosen.wheels)
+        code, error = carry_out(steps, lambda words: run([*pip, *words]))
         if code:
-            raise _failure(error, folder, self.log)
+            raise _failure(error, folder, log)
         task.say(99, 100, "trying every package")
         return verify(python_of(folder), requirements, importing=True, task=task)
+
+    continued = _begun(folder, made_for)
+    problems = bring(anew=not continued)
+    if problems and continued:  # pip trusts an environment's metadata although files may be missing or damaged
+        problems = bring(anew=True)
+    if problems:
+        raise Problem(problems[0], f"Install again; the log is {log}.")
 
 
 def _begun(folder: Path, made_for: str) -> bool:

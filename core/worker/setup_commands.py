@@ -24,44 +24,21 @@ POLL_S = 0.1  # between two looks at the installation
 
 def add_commands(commands) -> None:
     """Add the commands to the subparsers of `python -m core`."""
-    install = add_command(
-        commands, "install", _install, "make the solver's environment from this Python, as Install Solver does"
-    )
-    install.add_argument(
-        "folder", metavar="FOLDER", type=Path, help="new, empty, or one that an earlier installation began"
-    )
-    install.add_argument(
-        "--wheels", metavar="FOLDER", type=Path, help="a folder of wheels to install from, without a network"
-    )
+    install = add_command(commands, "install", _install, "make the solver's environment from this Python")
+    install.add_argument("folder", metavar="FOLDER", type=Path, help="new, empty, or one of an earlier installation")
+    install.add_argument("--wheels", metavar="FOLDER", type=Path, help="install from a folder of wheels, offline")
     _add_build(install)
-    bring = add_command(
-        commands,
-        "wheels",
-        _wheels,
-        "download all wheels of a platform into a folder, to install from without a network",
-        "FOLDER",
-    )
-    bring.add_argument(
-        "--for",
-        dest="name",
-        choices=locks.names(),
-        metavar="PLATFORM-PYTHON",
-        help=f"{', '.join(locks.names())}; this machine and Python without it",
-    )
+    bring = add_command(commands, "wheels", _wheels, "download all wheels to install from offline", "FOLDER")
+    names = f"{', '.join(locks.names())}; by default this machine and Python"
+    bring.add_argument("--for", dest="name", choices=locks.names(), metavar="PLATFORM-PYTHON", help=names)
     _add_build(bring)
 
 
 def _add_build(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--compute", choices=("auto", "cpu", "cuda", "apple"), default="auto", help="what PyTorch computes on"
-    )
-    parser.add_argument(
-        "--packages",
-        choices=("pytorch", "pip"),
-        default="pytorch",
-        help="where PyTorch comes from: its own index where PyPI lacks the build, or with all others "
-        "from where pip is set up to look",
-    )
+    computes = ("auto", "cpu", "cuda", "apple")
+    parser.add_argument("--compute", choices=computes, default="auto", help="device that PyTorch is built for")
+    words = "source of PyTorch: its own index where PyPI lacks the build, or the index that pip is configured for"
+    parser.add_argument("--packages", choices=("pytorch", "pip"), default="pytorch", help=words)
 
 
 def _install(options: argparse.Namespace) -> int:

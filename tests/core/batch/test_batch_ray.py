@@ -164,8 +164,8 @@ def test_the_gate_waits_and_a_cluster_that_cannot_work_is_refused(code, cluster,
     with monkeypatch.context() as elsewhere, pytest.raises(Problem, match=f"{tmp_path / 'none'}. Set WILDCAP_CODE"):
         elsewhere.setattr(ray_cluster, "ROOT", tmp_path / "none")
         ray_cluster._examine_nodes(cluster, batch, 1)
-    tally = ray_cluster.run_on_ray(batch, batch.faces, False, print, None, None, 1)
-    assert tally.ended == dict.fromkeys("ab", WAITING) and states(batch) == dict.fromkeys("ab", WAITING)
+    ended = ray_cluster.run_on_ray(batch, batch.faces, False, print, None, None, 1)
+    assert ended == dict.fromkeys("ab", WAITING) and states(batch) == dict.fromkeys("ab", WAITING)
 
 
 def test_a_face_whose_node_is_given_up_is_begun_elsewhere(tmp_path):
