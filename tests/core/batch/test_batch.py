@@ -97,7 +97,7 @@ def test_a_machine_that_has_gone_holds_nothing(code, tmp_path, monkeypatch):
 
 def test_a_batch_is_run_by_one_at_a_time(code, tmp_path):
     batch = make(tmp_path, "a")
-    with lease.hold(batch.root, folder_kind="batch"):
+    with lease.hold_file(batch.root / "lock", folder_kind="batch"):
         ran = core(code, "batch", "run", batch.root)
         assert ran.returncode == 2 and "is working on this batch" in ran.stderr
         assert f"process {os.getpid()}" in core(code, "batch", "status", batch.root).stdout
