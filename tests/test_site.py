@@ -60,7 +60,6 @@ def test_an_older_installation_is_updated_from_our_repository(sources, tmp_path)
     site, local = tmp_path / "site", tmp_path / "extensions"
     local.mkdir()
     handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=str(site))
-    handler.log_message = lambda *_: None
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     where = ("--remote-url", f"http://127.0.0.1:{server.server_port}/index.json", "--local-dir", str(local))
@@ -74,25 +73,13 @@ def test_an_older_installation_is_updated_from_our_repository(sources, tmp_path)
     finally:
         server.shutdown()
         server.server_close()
-
-
-def test_the_listing_and_the_page_name_the_zip(sources, tmp_path):
-    site = tmp_path / "site"
-    publish(sources, site, MANIFEST["version"])
     (entry,) = json.loads((site / "index.json").read_text(encoding="utf-8"))["data"]
     archive = site / f"wildcap-{MANIFEST['version']}.zip"
-    assert (
-        entry["id"] == "wildcap" and entry["version"] == MANIFEST["version"] and entry["license"] == MANIFEST["license"]
-    )
-    assert (
-        entry["archive_size"] == archive.stat().st_size
-        and entry["archive_hash"] == f"sha256:{hashlib.sha256(archive.read_bytes()).hexdigest()}"
-    )
+    assert entry["id"] == "wildcap" and entry["license"] == MANIFEST["license"]
+    assert entry["archive_hash"] == f"sha256:{hashlib.sha256(archive.read_bytes()).hexdigest()}"
     page = (site / "index.html").read_text(encoding="utf-8")
     link = rf'href="[^"]*{re.escape(archive.name)}\?repository=[^"]*index\.json'
-    assert re.search(link, page), "the drag brings the repository along"
-    assert "${" not in page
-    assert "Why it is here and not on extensions.blender.org" in page
+    assert re.search(link, page) and "${" not in page, "the drag brings the repository along"
 
 
 def test_the_manifest_names_every_licence_and_holder_of_what_ships():

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tasks of a face: groups of stages that run on one machine in one go, with what they need of it. Standard library
-only."""
+"""Tasks of a face: groups of stages that run in one go on one machine. Standard library only."""
 
 from __future__ import annotations
 
@@ -12,14 +11,13 @@ from ..capture.messages import Problem
 from ..capture.stages import MASK_STAGE, NAMES, Stage
 
 GATE = "solve"
-"""The group that a batch with an artist's gate begins only when the artist has looked at the mask."""
+"""Group that waits for the artist's review of the mask, if the batch has that gate."""
 DELIVER = "deliver"
 
 
 @dataclass(frozen=True)
 class StageGroup:
-    """`first` and `last` name its stages; `memory_gb` is what a machine should have free for it (the largest stage of
-    the table of costs, rounded up); `on_device` says that a GPU helps."""
+    """Stages `first` to `last`, the free memory that the largest needs, and whether a GPU helps."""
 
     name: str
     label: str
@@ -39,14 +37,18 @@ GROUPS = (
     StageGroup(GATE, "Solve", "solve", "upscale", 5.0, on_device=True),
     StageGroup(DELIVER, "Deliver", "transfer", "transfer", 2.0),
 )
-"""In their order; each begins where the one before has ended."""
 
 
 def group_named(name: str) -> StageGroup:
-    """Raises Problem for an unknown name."""
+    """Return a group by its name. Raises Problem if there is none."""
     for group in GROUPS:
         if group.name == name:
             return group
     raise Problem(
         f"There is no task named {name!r}.", f"The tasks of a face are {', '.join(group.name for group in GROUPS)}."
     )
+
+
+def groups_until(name: str | None) -> tuple[StageGroup, ...]:
+    """Return the groups up to `name`, or all of them."""
+    return GROUPS[: GROUPS.index(group_named(name)) + 1] if name else GROUPS

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""BATCH/hashes.json: the content hashes that earlier looks at a batch took, so that the next one reads only what has
-changed. Standard library only.
+"""BATCH/hashes.json: content hashes kept between runs, so that only changed files are read again.
 
-A finished face has 0.4 GB, and a look compares its stages with what they were made from: two hundred faces on a file
-server would be read anew each time.
+Deciding whether a stage is fresh hashes its inputs. A finished face has 0.4 GB; on a file server, hashing hundreds of
+them each time would take minutes. Standard library only.
 """
 
 from __future__ import annotations
@@ -23,18 +22,18 @@ NAME = "hashes.json"
 
 @contextlib.contextmanager
 def known_hashes(root: Path) -> Iterator[None]:
-    """Takes in what is known of the files in a batch's folder that have kept their size and time, and keeps what is
-    learnt meanwhile. A file that is damaged, or cannot be written, costs time and nothing else."""
+    """Load the hashes of a batch's files, and save new ones afterwards; a damaged file costs time only."""
     with contextlib.suppress(OSError, ValueError, TypeError):
         add_hashes(root, read_json(root / NAME))
     before = len(list_hashes(root))
     try:
         yield
     finally:
-        known = {
-            (kind, path): [kind, path, size, when, digest]
-            for kind, path, size, when, digest in sorted(list_hashes(root), key=lambda each: each[3])
-        }
         if len(list_hashes(root)) > before:
+            newest = {(kind, path): [kind, path, *rest] for kind, path, *rest in sorted(list_hashes(root), key=_time)}
             with contextlib.suppress(Problem):
-                write_json(root / NAME, list(known.values()))
+                write_json(root / NAME, list(newest.values()))
+
+
+def _time(known: tuple) -> int:
+    return known[3]

@@ -1,11 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A batch on a cluster of Ray's: each face a chain of tasks, on whichever nodes have the cores, the memory and the GPU
-that a task declares.
+"""A batch on a Ray cluster: each face is a chain of tasks, on nodes with the cores, memory and GPU they declare.
 
-A Problem is an outcome and stops its face alone. A process or a node that dies is Ray's to notice: it gives the task to
-another one, which goes on from the capture's record. Ray is imported where a batch runs on it; otherwise standard
-library only.
+A Problem stops its face alone. When a process or a node dies, Ray gives the task to another one, which continues from
+the capture's record. Ray is imported only where a batch runs on it; otherwise standard library only.
 """
 
 from __future__ import annotations
@@ -19,24 +17,21 @@ from .. import __version__
 from ..capture import lease
 from ..capture.hashes import hash_file
 from ..capture.messages import Problem, from_line
-from .groups import GROUPS, StageGroup
-from .local import CANCELLED, EVERY_S, Board, Tally, forget_stop, is_asked_to_stop
+from .groups import GROUPS, StageGroup, groups_until
+from .local import CANCELLED, EVERY_S, Board, forget_stop, is_asked_to_stop, next_task
 from .ray_connection import connect
 from .record import NAME, Batch, BatchFace
-from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, FaceState, derive_state
+from .state import DONE, STOPPED, WORKING
 from .task import ROOT
 
 CODE = "WILDCAP_CODE"
-"""Environment variable of a node: the folder that holds core/ there, where that is another one than where the batch is
-run from."""
+"""Environment variable of a node: the folder that holds core/ there, if it differs from ours."""
 EXAMINE_S = 60.0
-"""How long a node may take to start its first process: it imports Ray, maybe from a network's disk."""
+"""Longest time for a node to start its first process, which imports Ray, perhaps from a network drive."""
 FACES_AHEAD = 2
-"""Faces that are under way for each that could be worked on at once: enough that no core waits, and the first faces are
-done long before the last."""
-OUT_S = 1.6
-"""How long tasks that are cancelled may take to give their captures back; those that are still there end with our
-connection."""
+"""Faces submitted per free slot: enough to keep all cores busy and still finish the first faces early."""
+CANCEL_S = 1.6
+"""Time for cancelled tasks to release their captures; the rest end with the connection."""
 
 
 def run_on_ray(
@@ -47,24 +42,11 @@ def run_on_ray(
     until: str | None,
     address: str | None,
     cores: int,
-) -> Tally:
-    """Runs what is to be done of these faces on a cluster. The caller holds the batch's lease. Ends early by
-    KeyboardInterrupt or the file `stop`; what was finished is kept.
+) -> dict[str, str]:
+    """Run the remaining tasks of faces on a cluster, each with `cores`, as `run_local` does on this machine.
 
-    Parameters
-    ----------
-    batch, faces, retry, tell, until : as `run_local` takes them
-    address : HOST:PORT of the cluster's head node, or auto; None: a cluster of this machine alone
-    cores : that each task takes
-
-    Returns
-    -------
-    How each face ended.
-
-    Raises
-    ------
-    Problem
-        Where there is no Ray, no cluster, or no node that could work on the batch.
+    `address` is HOST:PORT of the head node or "auto"; None makes a cluster of this machine. Raises Problem if there is
+    no Ray, no cluster, or no node that can work on the batch.
     """
     faces = list(faces)
     forget_stop(batch.root)
@@ -77,33 +59,32 @@ def run_on_ray(
         finally:
             run.end()
             forget_stop(batch.root)
-    return run.board.tally
+    return run.board.ended
 
 
 class _Run:
-    """Faces on their way through the cluster. `advance` until nothing is under way, then `end`."""
+    """Faces on their way through the cluster: `advance` until nothing is under way, then `end`."""
 
     def __init__(
         self, ray, batch: Batch, faces: list[BatchFace], retry: bool, board: Board, until: str | None, cores: int
     ):
         self._ray, self._batch, self._retry, self._cores = ray, batch, retry, cores
         self.board = board
-        names = [group.name for group in GROUPS]
-        self._groups = GROUPS[: names.index(until) + 1 if until else None]
+        self._groups = groups_until(until)
         self._left = deque(faces)
-        self._tasks: dict = {}  # Ray's reference -> (face, group, whether it is the face's last)
+        self._tasks: dict = {}  # Ray's reference -> (face, group)
         self._call, self._post = _define_call(ray), _define_post(ray)
-        self._places: dict[str, str] = {}  # face -> the node that said that it works on it
-        self._asked, self._heard = None, 0.0
+        self._places: dict[str, str] = {}  # face -> node that works on it
+        self._request, self._heard = None, 0.0
         board.write(now=True)
 
     def is_under_way(self) -> bool:
         return bool(self._left or self._tasks)
 
     def advance(self) -> None:
-        """Begins faces, takes outcomes and progress; lasts half a second at most where nothing happens."""
+        """Submit faces, collect results and progress; return within half a second."""
         slots = max(1, int(self._ray.cluster_resources().get("CPU", 0) / self._cores))
-        under_way = {face.name for face, _, _ in self._tasks.values()}
+        under_way = {face.name for face, _ in self._tasks.values()}
         while self._left and len(under_way) < FACES_AHEAD * slots:
             face = self._left.popleft()
             if self._begin(face):
@@ -114,19 +95,14 @@ class _Run:
         self._hear()
 
     def _begin(self, face: BatchFace, again: bool = False) -> bool:
-        """Submits what is left of a face, `again` where we had it before; False where that is nothing."""
-        state = derive_state(self._batch, face)
-        if state.state == STOPPED and self._retry and state.group is not None:
-            state = FaceState(TO_DO, state.group)
-        if state.state == DONE or state.group not in self._groups and state.state != STOPPED:
-            self.board.end(face, DONE, "done")
-            return False
-        if state.state not in (TO_DO, WORKING):  # who works there may be a machine that has gone: the task finds out
-            self.board.end(face, WAITING if state.state == WAITING else STOPPED, state.words())
+        """Submit the remaining tasks of a face and return whether there were any; `again`: it was ours before."""
+        state = next_task(self._batch, face, self._groups, self._retry, self.board)
+        if state is None:
             return False
         has_gpu = self._ray.cluster_resources().get("GPU", 0) > 0 and face.chosen().device != "cpu"
-        before, holder = None, lease.holder(face.capture.lock) if state.state == WORKING and not again else None
+        holder = lease.holder(face.capture.lock) if state.state == WORKING and not again else None
         stranger = str((holder or {}).get("token", ""))
+        before = None
         for group in self._groups[self._groups.index(state.group) :]:
             task = self._call.options(
                 name=f"{face.name}.{group.name}",
@@ -136,55 +112,39 @@ class _Run:
                 max_retries=-1,
                 retry_exceptions=False,
             )
-            before = task.remote(
-                before,
-                str(ROOT),
-                "do_task",
-                self._post,
-                str(self._batch.root),
-                face.name,
-                group.name,
-                self._cores,
-                stranger,
-            )
-            self._tasks[before] = face, group, group is self._groups[-1]
+            words = (str(self._batch.root), face.name, group.name, self._cores, stranger)
+            before = task.remote(before, str(ROOT), "do_task", self._post, *words)
+            self._tasks[before] = face, group
         return True
 
-    def _take(self, ref, face: BatchFace, group: StageGroup, is_last: bool) -> None:
+    def _take(self, ref, face: BatchFace, group: StageGroup) -> None:
+        """Collect the result of a task; a face that ends takes its later tasks with it."""
         try:
             outcome = self._ray.get(ref)
         except self._ray.exceptions.RayTaskError:
-            raise  # an error of ours is told as one
+            raise  # an error of our own code
         except self._ray.exceptions.RayError as error:
-            outcome = {
-                "state": STOPPED,
-                "words": f"Ray has given the task up ({type(error).__name__}). Run the batch again: finished "
-                "stages are kept.",
-            }
-        self.board.tally.worked.add(face.name)
+            words = f"Ray gave the task up ({type(error).__name__}). Run the batch again: finished stages are kept."
+            outcome = {"state": STOPPED, "words": words}
+        self.board.worked.add(face.name)
         self._places.pop(face.name, None)
+        label, words = group.label.lower(), outcome["words"]
         if outcome["state"] == DONE:
-            self.board.say(face, f"{group.label.lower()} done in {outcome['seconds']:.0f} s on {outcome['host']}")
-            if is_last:
+            self.board.say(face, f"{label} done in {outcome['seconds']:.0f} s on {outcome['host']}")
+            if group is self._groups[-1]:
                 self.board.end(face, DONE, "done")
             return
-        # they pass the outcome on
         self._tasks = {other: task for other, task in self._tasks.items() if task[0].name != face.name}
-        self.board.end(
-            face,
-            outcome["state"],
-            f"{group.label.lower()} stopped: {outcome['words']}" if outcome["state"] == STOPPED else outcome["words"],
-        )
+        self.board.end(face, outcome["state"], f"{label} stopped: {words}" if outcome["state"] == STOPPED else words)
 
     def _hear(self) -> None:
-        """What tasks say of where they are and how far, asked for once in a while and not waited for; nothing is lost
-        where that cannot be had."""
-        if self._asked is None and time.monotonic() - self._heard > EVERY_S:
-            self._asked, self._heard = self._post.take.remote(), time.monotonic()
-        if self._asked is None or not self._ray.wait([self._asked], timeout=0)[0]:
+        """Ask the post for places and progress once in a while, without waiting for the answer."""
+        if self._request is None and time.monotonic() - self._heard > EVERY_S:
+            self._request, self._heard = self._post.take.remote(), time.monotonic()
+        if self._request is None or not self._ray.wait([self._request], timeout=0)[0]:
             return
-        request, self._asked = self._asked, None
-        working = {face.name: face for face, _, _ in self._tasks.values()}
+        request, self._request = self._request, None
+        working = {face.name: face for face, _ in self._tasks.values()}
         with contextlib.suppress(self._ray.exceptions.RayError):
             places, lines = self._ray.get(request)
             self._places |= {name: node for name, node in places.items() if name in working}
@@ -193,9 +153,11 @@ class _Run:
             self._leave_dead_nodes(working)
 
     def _leave_dead_nodes(self, working: dict[str, BatchFace]) -> None:
-        """Has faces done elsewhere whose node has been given up. Ray does so by itself where a connection breaks; where
-        one only falls silent, as at a power cut, it waits for five minutes, and its setting for that
-        (RAY_grpc_client_keepalive_time_ms) has the other side take us for an attack."""
+        """Submit again the faces of nodes that the cluster has given up.
+
+        Ray does so by itself where a connection breaks. Where a node only falls silent, as at a power cut, it waits for
+        five minutes, and with a shorter RAY_grpc_client_keepalive_time_ms the other side takes us for an attack.
+        """
         alive = {node["NodeID"] for node in self._ray.nodes() if node["Alive"]}
         for name in [name for name, node in self._places.items() if node not in alive]:
             del self._places[name]
@@ -206,14 +168,14 @@ class _Run:
                 self._begin(working[name], again=True)
 
     def end(self) -> None:
-        """Cancels what is under way, wherever it is, and waits a moment for it."""
-        refs, faces = list(self._tasks), {face.name: face for face, _, _ in self._tasks.values()}
+        """Cancel what is under way, and wait a moment for it."""
+        refs, faces = list(self._tasks), {face.name: face for face, _ in self._tasks.values()}
         for ref in refs:
             self._ray.cancel(ref)
         if refs:
-            self._ray.wait(refs, num_returns=len(refs), timeout=OUT_S)
+            self._ray.wait(refs, num_returns=len(refs), timeout=CANCEL_S)
         for face in faces.values():
-            self.board.end(face, CANCELLED, "cancelled; what was finished is kept")
+            self.board.end(face, CANCELLED, "cancelled; finished stages are kept")
         self.board.write(now=True)
 
 
@@ -222,8 +184,10 @@ def _bytes(group: StageGroup) -> int:
 
 
 def _define_call(ray):
-    """The remote function in which every task runs. It goes to the nodes by its source and finds WildCap there by a
-    path; `before` is the outcome of the face's task before, which is passed on where that did not end well."""
+    """Return the remote function that runs a task. Ray ships it as source; it finds WildCap on its node by a path.
+
+    `before` is the outcome of the face's previous task, which is passed on unless that succeeded.
+    """
     variable, package = CODE, f"{__package__.rpartition('.')[0].rpartition('.')[2]}.batch.ray_task"
 
     @ray.remote
@@ -238,12 +202,10 @@ def _define_call(ray):
         if before is not None and before["state"] != "done":
             return before
         code = os.environ.get(variable, code)
-        # another one may lie where this Python looks as well
+        # this Python may find another core elsewhere
         if not os.path.isfile(os.path.join(code, *package.split(".")) + ".py"):
-            return {
-                "state": "stopped",
-                "words": f"The node {socket.gethostname()} has no WildCap at {code}. Set {variable} there.",
-            }
+            problem = f"The node {socket.gethostname()} has no WildCap at {code}. Set {variable} there."
+            return {"state": "stopped", "words": problem}
         sys.path[:] = [code, *(place for place in sys.path if place != code)]
         module = importlib.import_module(package)
         if post is None:
@@ -255,7 +217,7 @@ def _define_call(ray):
 
 
 def _define_post(ray):
-    """An actor beside us, for what tasks say: of each face the node that works on it, and the last line of progress."""
+    """Return an actor on this node that collects each face's node and last line of progress."""
 
     @ray.remote(num_cpus=0, max_restarts=-1)
     class Post:
@@ -272,17 +234,19 @@ def _define_post(ray):
             taken, (self.places, self.lines) = (self.places, self.lines), ({}, {})
             return taken
 
-    strategy = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy
-    here = strategy(ray.get_runtime_context().get_node_id(), soft=False)
-    return Post.options(scheduling_strategy=here).remote()
+    return Post.options(scheduling_strategy=_pin(ray, ray.get_runtime_context().get_node_id())).remote()
+
+
+def _pin(ray, node: str):
+    """Return Ray's strategy for this node and no other."""
+    return ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(node, soft=False)
 
 
 def _examine_nodes(ray, batch: Batch, cores: int) -> None:
-    """Raises Problem where no node has what a task needs, and for the first one that does not have the code or see the
-    batch: it would stop face after face."""
+    """Raise Problem if no node has what a task needs, or if one lacks the code or the batch."""
     need = max(GROUPS, key=lambda group: group.memory_gb)
     fit = [
-        node
+        node["NodeID"]
         for node in ray.nodes()
         if node["Alive"]
         and node["Resources"].get("CPU", 0) >= cores
@@ -290,29 +254,21 @@ def _examine_nodes(ray, batch: Batch, cores: int) -> None:
     ]
     if not fit:
         raise Problem(
-            f"No node of the cluster has {cores} core{'' if cores == 1 else 's'} and {need.memory_gb:.0f} "
-            f"GB, as the task {need.name} needs.",
-            "Start one with `ray start` and its --num-cpus and --memory, or have each task take fewer cores "
-            "with --cores.",
+            f"No node of the cluster has {cores} core{'' if cores == 1 else 's'} and {need.memory_gb:.0f} GB, as the "
+            f"task {need.name} needs.",
+            "Start one with `ray start` and its --num-cpus and --memory, or give each task fewer cores with --cores.",
         )
     call, words = _define_call(ray), ("examine", None, str(batch.root), __version__, hash_file(batch.root / NAME))
     pending = [
-        call.options(
-            num_cpus=0,
-            scheduling_strategy=ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(
-                node["NodeID"], soft=False
-            ),
-        ).remote(None, str(ROOT), *words)
-        for node in fit
+        call.options(num_cpus=0, scheduling_strategy=_pin(ray, node)).remote(None, str(ROOT), *words) for node in fit
     ]
     answered, _ = ray.wait(pending, num_returns=len(pending), timeout=EXAMINE_S)
     for ref in answered:
-        with contextlib.suppress(ray.exceptions.RayError):  # a node that has just gone harms nobody
+        with contextlib.suppress(ray.exceptions.RayError):  # a node that has just gone
             outcome = ray.get(ref)
             if outcome["words"]:
                 raise Problem(
                     outcome["words"],
-                    "Give the node the same WildCap, its packages, and the batch's folder under the same "
-                    "path, as the page on farms"
-                    " (docs/farm.md) says; or stop Ray there.",
+                    "Give the node the same WildCap, its packages, and the batch's folder under the same path (see "
+                    "docs/farm.md), or stop Ray there.",
                 )

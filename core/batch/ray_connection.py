@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The way to a cluster of Ray's, or to one of this machine alone: within seconds or not at all, in silence, and with a
-token. Standard library but for Ray."""
+"""The connection to a Ray cluster, or to one of this machine alone: quick to fail, silent, and with a token.
+
+Standard library but for Ray.
+"""
 
 from __future__ import annotations
 
@@ -22,18 +24,18 @@ QUIET = {
     "RAY_DEDUP_LOGS_SKIP_REGEX": "^",
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
 }
-"""Ray tells nobody of its use, and nothing on our terminal."""
+"""Keeps Ray from reporting its use and from writing to our terminal."""
 REACH_S, JOIN_S = 3.0, 12.0
-"""How long a head node may take to answer at all, and then to take us in: Ray itself would try for minutes."""
+"""Longest time for a head node to answer, and then to accept us; Ray itself would try for minutes."""
 STORE_BYTES = 100 << 20
-"""Ray's shared memory, for outcomes of a few hundred bytes: near the least it takes."""
+"""Ray's shared memory, close to its minimum: outcomes take a few hundred bytes."""
 
 
 @contextlib.contextmanager
 def connect(address: str | None) -> Iterator:
-    """Ray, connected; where that ends, every task of ours ends with it. Raises Problem."""
+    """Connect to Ray and yield it; all our tasks end with the block. Raises Problem."""
     os.environ.update(QUIET)
-    if address is None:  # its processes answer nobody but us
+    if address is None:  # a token keeps everybody else out
         os.environ["RAY_AUTH_MODE"] = "token"
         os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))
     elif "RAY_AUTH_MODE" not in os.environ:
@@ -47,21 +49,14 @@ def connect(address: str | None) -> Iterator:
     except ImportError as error:
         raise Problem(
             f"This Python has no Ray ({error}).",
-            "Install what requirements/farm.txt names, or run the batch with --on local.",
+            "Install the packages of requirements/farm.txt, or run the batch with --on local.",
         ) from error
     quiet = {"log_to_driver": False, "configure_logging": False, "logging_level": "CRITICAL"}
+    own = {"include_dashboard": False, "object_store_memory": STORE_BYTES, "_node_ip_address": "127.0.0.1"}
     with _mute():
         try:
             if address is None:
-                _begin(
-                    lambda: ray.init(
-                        "local",
-                        include_dashboard=False,
-                        object_store_memory=STORE_BYTES,
-                        _node_ip_address="127.0.0.1",
-                        **quiet,
-                    )
-                )
+                _begin(lambda: ray.init("local", **own, **quiet))
             else:
                 _reach(address)
                 _join(lambda: ray.init(address, **quiet), address)
@@ -72,40 +67,38 @@ def connect(address: str | None) -> Iterator:
 
 @contextlib.contextmanager
 def _mute() -> Iterator[None]:
-    """What Ray prints in our name goes nowhere; what we have to say goes to stdout, or is raised."""
+    """Discard what Ray prints to stderr; our own output goes to stdout or is raised."""
     sys.stderr.flush()
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
+    stderr, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 2)
     try:
         yield
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)
+        os.dup2(stderr, 2)
+        os.close(stderr)
+        os.close(null)
 
 
 def _begin(begin: Callable[[], object]) -> None:
-    """Raises Problem where Ray does not come up, as within the 30 seconds that it gives itself on a machine that is
-    busy with something else."""
+    """Start Ray here. Raises Problem if it fails, for instance within its 30 seconds on a busy machine."""
     try:
         begin()
-    except Exception as error:  # it has no class of its own for that
-        said = str(error).strip().partition("\n")[0]
+    except Exception as error:  # Ray has no class of its own for this
         raise Problem(
-            f"Ray could not be started on this machine: {said}",
-            "Try again when it is less busy, or run the batch with --on local.",
+            f"Ray could not be started on this machine: {str(error).strip().partition(chr(10))[0]}",
+            "Try again when the machine is less busy, or run the batch with --on local.",
         ) from error
 
 
 def _reach(address: str) -> None:
-    """Raises Problem where nothing answers there."""
+    """Raise Problem if nothing answers at an address."""
     if address == "auto":
         return
     host, _, port = address.rpartition(":")
     if not host or not port.isdecimal():
         raise Problem(
             f"{address} is not the address of a Ray head node.",
-            "Write it as HOST:PORT; `ray start --head` tells it. The port is 6379 if you chose none.",
+            "Write it as HOST:PORT, as `ray start --head` prints it; the default port is 6379.",
         )
     try:
         socket.create_connection((host.strip("[]"), int(port)), REACH_S).close()
@@ -114,14 +107,14 @@ def _reach(address: str) -> None:
 
 
 def _join(begin: Callable[[], object], address: str) -> None:
-    """Connects in a thread, for Ray does not say in time that it cannot. Raises Problem."""
+    """Connect in a thread, for Ray is slow to fail. Raises Problem."""
     ended: list[BaseException | None] = []
 
     def run() -> None:
         try:
             begin()
             ended.append(None)
-        except BaseException as error:  # Ray exits where it gives up
+        except BaseException as error:  # Ray exits when it gives up
             ended.append(error)
 
     thread = threading.Thread(target=run, name="wildcap-ray", daemon=True)
@@ -134,7 +127,6 @@ def _join(begin: Callable[[], object], address: str) -> None:
 def _unreachable(address: str, why: str) -> Problem:
     return Problem(
         f"No Ray cluster can be reached at {address} ({why}).",
-        "See that its head node runs (`ray status` there), that this machine is one of its nodes (`ray "
-        "start --address=HOST:PORT --num-cpus=0` makes"
-        " it one), and that both have Ray's token.",
+        "Check that its head node runs (`ray status`), that this machine is one of its nodes (`ray start "
+        "--address=HOST:PORT --num-cpus=0`), and that both have Ray's token.",
     )

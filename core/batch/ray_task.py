@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a node of Ray's does of a batch: shows that it can, and runs the tasks it is given. Ray itself is not needed
-here. Standard library only.
+"""A Ray node's side of a batch: show that it can work, and run tasks. Needs no Ray itself, standard library only.
 
-What goes back and forth are plain values: an outcome is {"state", "words", "seconds", "host"}. BATCH/logs/HOST.jsonl
-says, stage by stage, what a node began and what it finished; nothing is ever derived from it.
+An outcome is {"state", "words", "seconds", "host"}. BATCH/logs/HOST.jsonl records which stages a node began and
+finished; nothing is ever derived from it.
 """
 
 from __future__ import annotations
@@ -31,20 +30,21 @@ from .state import DONE, STOPPED, WAITING, FaceState, waits
 from .task import run_task
 
 BATCHES = "WILDCAP_BATCHES"
-"""Environment variable of a node: the folder in which the batches lie there, where that is another one than where they
-are run from."""
+"""Environment variable of a node: the folder of the batches there, if it differs from ours."""
 LOGS = "logs"
 
 
 def find_batch(root: str) -> Batch:
-    """The batch whose folder is `root` on the machine that runs it, as this node sees it. Raises Problem."""
+    """Return the batch whose folder is `root` on the machine that runs it. Raises Problem."""
     folder = os.environ.get(BATCHES)
     return read_batch(Path(folder) / Path(root).name if folder else root)
 
 
 def examine(root: str, version: str, record: str) -> str:
-    """What keeps this node from working on the batch, '' for nothing. `version` is WildCap's where the batch is run
-    from, `record` the hash of batch.json."""
+    """Return what keeps this node from working on the batch, or ''.
+
+    `version` is WildCap's on the machine that runs the batch, `record` the hash of its batch.json.
+    """
     host = socket.gethostname()
     if __version__ != version:
         return f"The node {host} has WildCap {__version__}, and this is {version}."
@@ -59,24 +59,13 @@ def examine(root: str, version: str, record: str) -> str:
 
 
 def do_task(root: str, name: str, group_name: str, threads: int, stranger: str, say: Callable[[str], None]) -> dict:
-    """Runs a task of a face.
+    """Run a task of a face and return its outcome; `say` takes progress as lines of JSON.
 
-    Parameters
-    ----------
-    root : the batch's folder on the machine that runs it
-    name : of the face
-    group_name : of the task
-    threads : how many its libraries may start
-    stranger : token of the lease that somebody had on the capture when the batch came to it, '' for nobody: whoever
-        else has it is a task of ours whose process or node has died, and is waited for
-    say : hears of its progress, as lines of JSON
-
-    Returns
-    -------
-    The outcome: {"state", "words", "seconds", "host"}.
+    `stranger` is the token of a lease on the capture that was there before the batch, or ''. Any other holder is a task
+    of ours whose process or node has died, and is waited for.
     """
     began, stopped, outcome = time.monotonic(), [], {"state": STOPPED, "words": "", "host": socket.gethostname()}
-    before = signal.signal(signal.SIGINT, lambda number, frame: stopped.append(number))  # as which Ray's cancel arrives
+    before = signal.signal(signal.SIGINT, lambda number, frame: stopped.append(number))  # Ray's way to cancel
     try:
         batch, group = find_batch(root), group_named(group_name)
         face = batch.face(name)
@@ -95,8 +84,7 @@ def do_task(root: str, name: str, group_name: str, threads: int, stranger: str, 
 
 
 def _outlast(capture: Capture, stranger: str, stopped: list) -> None:
-    """Waits until the worker of a Ray process that was killed beside us has ended, too, or that of a node that has gone
-    has not been heard of for a term."""
+    """Wait until the worker of a killed task has ended, or the lease of a dead node has run out."""
     deadline = time.monotonic() + 2 * lease.TERM_S
     while not stopped:
         holder = lease.holder(capture.lock)
@@ -112,26 +100,21 @@ def _outlast(capture: Capture, stranger: str, stopped: list) -> None:
 
 
 def _listener(batch: Batch, name: str, say: Callable[[str], None]) -> Callable[[Message], None]:
-    """Passes a worker's progress on, once in a while, and keeps the account of the stages."""
-    said = [0.0]
+    """Return a function that passes a worker's progress on once in a while and logs the stages."""
+    sent = [0.0]  # time of the last line
     account = batch.root / LOGS / f"{socket.gethostname()}.jsonl"
 
     def hear(message: Message) -> None:
         begins = isinstance(message, Progress) and (message.done, message.text) == (0, "Starting")
-        if begins or isinstance(message, Progress) and time.monotonic() - said[0] > EVERY_S:
-            said[0] = time.monotonic()
+        if begins or isinstance(message, Progress) and time.monotonic() - sent[0] > EVERY_S:
+            sent[0] = time.monotonic()
             say(to_line(message))
         if begins or isinstance(message, StageDone) and not message.skipped:
-            line = {
-                "at": round(time.time(), 2),
-                "face": name,
-                "stage": message.stage,
-                "finished": isinstance(message, StageDone),
-                "pid": os.getpid(),
-            }
+            finished = isinstance(message, StageDone)
+            line = {"at": round(time.time(), 2), "face": name, "stage": message.stage, "finished": finished}
             with contextlib.suppress(OSError):
                 account.parent.mkdir(exist_ok=True)
                 with open(account, "a", encoding="utf-8") as file:
-                    file.write(json.dumps(line) + "\n")
+                    file.write(json.dumps({**line, "pid": os.getpid()}) + "\n")
 
     return hear

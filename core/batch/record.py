@@ -1,13 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""batch.json: which faces a batch has and what is asked for each. It says nothing of what has been done. Standard
-library only.
+"""batch.json: the faces of a batch and what is wanted for each, not what has been done. Standard library only.
 
     {"format": 1, "gate": "automatic", "blender": "", "deliver": {}, "faces": [{"name", "source", "capture", "quality",
     "settings"}]}
 
-Paths are relative to the batch's folder where they travel with it (portable_paths.py), so that machines may see it
-under different names.
+Paths that travel with the batch's folder are relative to it (portable_paths.py), so machines may mount it anywhere.
 """
 
 from __future__ import annotations
@@ -20,19 +18,21 @@ from ..capture.files import write_json
 from ..capture.json_files import plain_name, read_json
 from ..capture.messages import Problem
 from ..capture.portable_paths import convert_settings, read_portable, write_portable
-from ..settings import settings as known
-from ..settings.settings import Settings
+from ..settings.settings import Settings, from_json, preset
 
 FORMAT = 1
 NAME = "batch.json"
 GATES = ("automatic", "artist")
 """Whether a face is solved with its proposed mask, or waits until the artist has accepted or painted one."""
+PLAN_AGAIN = "Plan the batch again from its table: its captures keep what they have."
 
 
 @dataclass(frozen=True)
 class BatchFace:
-    """`source` is a video or a folder of photographs; `settings` ({stage: {name: value}, seed, device}) lie over the
-    preset `quality`; paths are absolute."""
+    """A face with absolute paths of its source, a video or a folder of photographs, and of its capture.
+
+    `settings` ({stage: {name: value}, seed, device}) lie over the preset `quality`.
+    """
 
     name: str
     source: Path
@@ -45,14 +45,13 @@ class BatchFace:
         return Capture(self.root)
 
     def chosen(self) -> Settings:
-        """What its stages are judged by."""
-        return known.from_json(self.settings, known.preset(self.quality))
+        """Return the settings that its stages are judged by."""
+        return from_json(self.settings, preset(self.quality))
 
 
 @dataclass(frozen=True)
 class Batch:
-    """`deliver` holds the settings of what is delivered of each face, None: nothing is; `blender` is the program that
-    renders contact sheets, '': none."""
+    """A batch; `deliver` holds the settings of deliveries, or None, `blender` the renderer of contact sheets, or ''."""
 
     root: Path
     faces: tuple[BatchFace, ...]
@@ -61,7 +60,7 @@ class Batch:
     blender: str = ""
 
     def face(self, name: str) -> BatchFace:
-        """Raises Problem for an unknown name."""
+        """Return a face by its name. Raises Problem if there is none."""
         for face in self.faces:
             if face.name == name:
                 return face
@@ -72,7 +71,7 @@ class Batch:
 
 
 def write_batch(batch: Batch) -> None:
-    """Raises Problem where it cannot be written."""
+    """Write batch.json. Raises Problem."""
 
     def portable(path: Path | str) -> str:
         return write_portable(path, batch.root)
@@ -88,61 +87,48 @@ def write_batch(batch: Batch) -> None:
         for face in batch.faces
     ]
     deliver = batch.deliver and convert_settings({"deliver": batch.deliver}, portable)["deliver"]
-    write_json(
-        batch.root / NAME,
-        {"format": FORMAT, "gate": batch.gate, "blender": batch.blender, "deliver": deliver, "faces": faces},
-    )
+    record = {"format": FORMAT, "gate": batch.gate, "blender": batch.blender, "deliver": deliver, "faces": faces}
+    write_json(batch.root / NAME, record)
 
 
 def read_batch(root: str | Path) -> Batch:
-    """Raises Problem for a folder that is no batch, and for a record that is damaged or newer than this version."""
+    """Read batch.json. Raises Problem if there is none, or if it is damaged or newer than this version."""
     root = Path(root).absolute()
     path = root / NAME
     try:
-        told = read_json(path)
+        record = read_json(path)
     except FileNotFoundError:
         raise Problem(
             f"There is no batch at {root}.", "Check the name; `python -m core batch plan SHOTS.csv BATCH` makes one."
         ) from None
     except (OSError, ValueError) as error:
-        raise Problem(
-            f"{path} cannot be read ({error}).", "Plan the batch again from its table: what its captures hold is kept."
-        ) from error
-    if isinstance(told, dict) and isinstance(told.get("format"), int) and told["format"] > FORMAT:
-        raise Problem(
-            "This batch was planned by a newer version of WildCap.", "Update WildCap to run it; nothing was changed."
-        )
+        raise Problem(f"{path} cannot be read ({error}).", PLAN_AGAIN) from error
+    if isinstance(record, dict) and isinstance(record.get("format"), int) and record["format"] > FORMAT:
+        raise Problem("This batch was planned by a newer version of WildCap.", "Update WildCap to run it.")
     try:
-        batch = _parse(root, told)
+        batch = _parse(root, record)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        raise Problem(
-            f"{path} is not a batch record ({error!r}).",
-            "Plan the batch again from its table: what its captures hold is kept.",
-        ) from error
+        raise Problem(f"{path} is not a batch record ({error!r}).", PLAN_AGAIN) from error
     names, roots = {face.name for face in batch.faces}, {face.root for face in batch.faces}
-    if len(names) < len(batch.faces) or len(roots) < len(batch.faces):
-        raise Problem(
-            f"{path} names a face or a capture twice.",
-            "Plan the batch again from its table: what its captures hold is kept.",
-        )
+    if min(len(names), len(roots)) < len(batch.faces):
+        raise Problem(f"{path} names a face or a capture twice.", PLAN_AGAIN)
     return batch
 
 
 def _parse(root: Path, record: dict) -> Batch:
     if record["gate"] not in GATES or not isinstance(record["blender"], str):
-        raise ValueError("its gate makes no sense")
+        raise ValueError("invalid gate or Blender")
     deliver = record["deliver"]
     if deliver is not None:
         deliver = convert_settings({"deliver": deliver}, lambda path: str(read_portable(path, root)))["deliver"]
-        known.from_json({"deliver": deliver})
-    return Batch(
-        root, tuple(_parse_face(root, face) for face in record["faces"]), record["gate"], deliver, record["blender"]
-    )
+        from_json({"deliver": deliver})
+    faces = tuple(_parse_face(root, face) for face in record["faces"])
+    return Batch(root, faces, record["gate"], deliver, record["blender"])
 
 
 def _parse_face(root: Path, record: dict) -> BatchFace:
     if not plain_name(record["name"]):
-        raise ValueError("a face's name is none")
+        raise ValueError("invalid name of a face")
     face = BatchFace(
         record["name"],
         read_portable(record["source"], root),

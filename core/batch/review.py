@@ -1,14 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""review.html: the faces of a batch on one page, in the order in which somebody should look at them.
+"""review.html: the faces of a batch on one page, in the order in which to look at them.
 
-First those that stopped, then those that wait for the artist, then all others; within each, the riskiest first. Risk
-has no threshold, for nobody has measured at which residual a face is bad: each measure of a face is the share of the
-batch's other faces that are better in it, and a face is as risky as its worst measure, for one thing gone wrong spoils
-a head, and a mean of five would hide it; where that is equal, the mean decides. So a face at the top is the first to
-look at, and not by that a bad one.
+Stopped faces come first, then those that wait for the artist, then the others; within each, the riskiest first. A
+measure of a face is ranked by the share of the other faces that are better, as no thresholds have been measured. The
+worst rank of a face is its risk, since one failure spoils a head and a mean would hide it; the mean breaks ties.
 
-Pictures are embedded as thumbnails, so the page can be sent to somebody; it loads nothing.
+Pictures are embedded as thumbnails: the page loads nothing and can be sent.
 """
 
 from __future__ import annotations
@@ -38,8 +36,7 @@ NAME = "review.html"
 
 @dataclass(frozen=True)
 class Measure:
-    """`figure` of `stage` in capture.json; `worse` is 1 where more is riskier, -1 where less is; `note` says what it
-    is."""
+    """A figure of a stage in capture.json; `worse` is 1 if more of it is riskier, else -1."""
 
     label: str
     stage: str
@@ -78,13 +75,13 @@ PICTURES = (
     ("shadow_mask", "shadow_mask_*.jpg", "As filmed, what was found, the mask"),
     ("solve", "solve_texture*.jpg", "Texture, albedo, shading"),
 )
-"""Stage, its picture in CAPTURE/report, and what it shows."""
+"""Stage, its picture in CAPTURE/report, and a caption."""
 FIRST_PICTURE = ("frames", "frames_*.jpg", "Frames")
-"""Shown where there is none of the others yet."""
+"""Shown until there is one of the others."""
 THUMBNAIL_PX, QUALITY = 160, 80
-"""Height, and JPEG quality: some 40 KB for a face, so 200 faces make a page of about 10 MB."""
+"""Height and JPEG quality: some 40 KB per face, 10 MB for 200 faces."""
 TALLEST_REM = 10
-"""Height on the page at most: as many pixels as a thumbnail has."""
+"""Greatest height on the page: as many pixels as a thumbnail has."""
 ORDER = (STOPPED, WAITING)
 HEADINGS = {STOPPED: "Stopped", WAITING: "Waiting for the artist", "": "The others, the riskiest first"}
 STATES = {DONE: "done", TO_DO: "to do", WORKING: "being worked on", WAITING: "waiting", STOPPED: "stopped"}
@@ -92,8 +89,7 @@ STATES = {DONE: "done", TO_DO: "to do", WORKING: "being worked on", WAITING: "wa
 
 @dataclass(frozen=True)
 class ReviewRow:
-    """One face: `values` by a measure's label, `ranks` the share of the others that are better, in [0, 1]; `findings`
-    as `report.findings` gives them."""
+    """One face: values and ranks (share of the others that are better, [0, 1]) by a measure's label, and findings."""
 
     face: BatchFace
     state: FaceState
@@ -104,16 +100,16 @@ class ReviewRow:
 
     @property
     def risk(self) -> tuple[float, float]:
-        """Its worst rank, and the mean of all; of a face that nothing is known of, the least."""
+        """Worst rank and mean of all; zeros for a face without figures."""
         return (max(self.ranks.values()), sum(self.ranks.values()) / len(self.ranks)) if self.ranks else (0.0, 0.0)
 
     @property
     def worst(self) -> str:
-        """The label of the measure that makes it risky; '' where nothing does."""
+        """Label of the measure with the worst rank; '' if no other face is better in any."""
         return max(self.ranks, key=self.ranks.__getitem__, default="") if self.risk[0] > 0 else ""
 
     def words(self) -> str:
-        """That measure in a line: 'mask 43 %, worse than 98 % of the others'."""
+        """Return the worst measure as in "mask 43 %, worse than 98 % of the others"."""
         if not self.worst:
             return "nothing is worse than in the others"
         others = "all others" if self.risk[0] == 1 else f"{self.risk[0]:.0%} of the others"
@@ -121,26 +117,21 @@ class ReviewRow:
 
 
 def write_review(batch: Batch) -> tuple[Path, list[ReviewRow]]:
-    """Writes BATCH/review.html; its path, and the faces in its order. Raises Problem where it cannot be written, or
-    something else is in its place."""
+    """Write BATCH/review.html; return its path, and the faces in its order.
+
+    Raises Problem if it cannot be written or would replace another file.
+    """
     path = batch.root / NAME
     if os.path.lexists(path) and not _is_ours(path):
         raise Problem(f"{path} is not a page that WildCap wrote.", "Move it away, then write the review again.")
     rows = sort_rows(read_rows(batch))
-    sections = "".join(
-        _section(
-            state,
-            [row for row in rows if row.state.state == state or not state and row.state.state not in ORDER],
-            batch,
-        )
-        for state in (*ORDER, "")
-    )
+    sections = {heading: [row for row in rows if _heading(row) == heading] for heading in HEADINGS}
     counts = {state: sum(row.state.state == state for row in rows) for state in STATES}
     page = PAGE.format(
         mark=MARK,
         title=html.escape(batch.root.name),
         style=STYLE,
-        sections=sections,
+        sections="".join(_section(heading, rows, batch) for heading, rows in sections.items()),
         version=__version__,
         written=time.strftime("%Y-%m-%d %H:%M"),
         counts="".join(
@@ -156,8 +147,13 @@ def write_review(batch: Batch) -> tuple[Path, list[ReviewRow]]:
     return path, rows
 
 
+def _heading(row: ReviewRow) -> str:
+    """Return the key of a row's section in HEADINGS."""
+    return row.state.state if row.state.state in ORDER else ""
+
+
 def _is_ours(path: Path) -> bool:
-    """Raises Problem where it cannot be read."""
+    """Return whether WildCap wrote a page. Raises Problem if it cannot be read."""
     try:
         return MARK in path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
@@ -165,60 +161,46 @@ def _is_ours(path: Path) -> bool:
 
 
 def read_rows(batch: Batch) -> list[ReviewRow]:
-    """What the captures' own records say, in the batch's order; a record that cannot be read says nothing."""
-    told = []
+    """Read the captures' records, in the batch's order; a record that cannot be read counts as empty."""
+    records, measured, found = [], [], []
     for face in batch.faces:
         record = {"stages": {}}
         with contextlib.suppress(Problem):
             record = face.capture.read()
-        stages = record["stages"]
         findings = [finding for finding in report.findings(record) if not finding["stopped"]]
-        figures = {
-            measure.label: stages[measure.stage]["figures"].get(measure.figure)
-            for measure in MEASURES
-            if measure.stage in stages
-        }
-        # NaN says nothing
-        figures = {
-            label: value for label, value in figures.items() if isinstance(value, int | float) and value == value
-        }
-        told.append(
-            (
-                {FINDINGS: len(findings), **figures} if stages else {},
-                sum(entry["seconds"] for entry in stages.values()),
-                findings,
-            )
-        )
-    ranks = rank([figures for figures, _, _ in told])
+        records.append(record["stages"])
+        measured.append(_measure(record["stages"], len(findings)))
+        found.append(findings)
     return [
-        ReviewRow(face, derive_state(batch, face), seconds, figures, own, findings)
-        for face, (figures, seconds, findings), own in zip(batch.faces, told, ranks, strict=True)
+        ReviewRow(face, derive_state(batch, face), sum(entry["seconds"] for entry in stages.values()), *rest)
+        for face, stages, *rest in zip(batch.faces, records, measured, rank(measured), found, strict=True)
     ]
 
 
+def _measure(stages: dict[str, dict], findings: int) -> dict[str, float]:
+    """Return the measures that finished stages have valid figures for."""
+    values: dict[str, float] = {FINDINGS: findings} if stages else {}
+    for measure in MEASURES:
+        value = stages.get(measure.stage, {}).get("figures", {}).get(measure.figure)
+        if isinstance(value, int | float) and value == value:  # not NaN
+            values[measure.label] = value
+    return values
+
+
 def rank(measured: list[dict[str, float]]) -> list[dict[str, float]]:
-    """For each face and measure the share of the other faces with that measure that are better, in [0, 1]."""
+    """Return for each face and measure the share of the other faces with that measure that are better, in [0, 1]."""
     ranks: list[dict[str, float]] = [{} for _ in measured]
     for measure in MEASURES:
-        known = [own[measure.label] * measure.worse for own in measured if measure.label in own]
-        for own, shares in zip(measured, ranks, strict=True):
-            if measure.label in own:
-                mine = own[measure.label] * measure.worse
-                shares[measure.label] = sum(other < mine for other in known) / max(len(known) - 1, 1)
+        risks = {i: own[measure.label] * measure.worse for i, own in enumerate(measured) if measure.label in own}
+        for i, risk in risks.items():
+            ranks[i][measure.label] = sum(other < risk for other in risks.values()) / max(len(risks) - 1, 1)
     return ranks
 
 
 def sort_rows(rows: list[ReviewRow]) -> list[ReviewRow]:
-    """Stopped, waiting, others; each the riskiest first, and by name where nothing tells them apart."""
-
-    def key(row: ReviewRow) -> tuple:
-        return (
-            ORDER.index(row.state.state) if row.state.state in ORDER else len(ORDER),
-            *(-share for share in row.risk),
-            row.face.name,
-        )
-
-    return sorted(rows, key=key)
+    """Sort by section, then by risk, then by name."""
+    sections = list(HEADINGS)
+    return sorted(rows, key=lambda row: (sections.index(_heading(row)), *(-share for share in row.risk), row.face.name))
 
 
 def _section(state: str, rows: list[ReviewRow], batch: Batch) -> str:
@@ -235,27 +217,20 @@ def _card(row: ReviewRow, batch: Batch) -> str:
     left = [group.label for group in GROUPS[GROUPS.index(state.group) :]] if state.group else []
     still = f"; still to do: {', '.join(left).lower()}" if left else ""
     words = f"{_duration(row.seconds)} of work{still}" + (f"; on {state.machine}" if state.machine else "")
-    problem = (
-        f'<p class="problem">{html.escape(state.problem)} <b>{html.escape(state.remedy)}</b></p>'
-        if state.state == STOPPED
-        else ""
-    )
-    bullets = "".join(
-        f"<li>{html.escape(finding['problem'])} <b>{html.escape(finding['remedy'])}</b></li>"
-        for finding in row.findings
-    )
-    told = (
-        f"<details><summary>{len(row.findings)} "
-        f"finding{'' if len(row.findings) == 1 else 's'}</summary><ul>{bullets}</ul></details>"
-        if bullets
-        else ""
-    )
+    problem = f'<p class="problem">{_sentences(state.problem, state.remedy)}</p>' if state.state == STOPPED else ""
+    bullets = "".join(f"<li>{_sentences(each['problem'], each['remedy'])}</li>" for each in row.findings)
+    count = f"{len(row.findings)} finding{'' if len(row.findings) == 1 else 's'}"
+    findings = f"<details><summary>{count}</summary><ul>{bullets}</ul></details>" if bullets else ""
     return (
         f'<article><div class="told"><h3>{title} <span class="badge '
         f'{_kind(state.state)}">{STATES[state.state]}</span></h3>'
-        f'<p class="when">{html.escape(words)}</p>{problem}{_bars(row)}{told}</div><div '
+        f'<p class="when">{html.escape(words)}</p>{problem}{_bars(row)}{findings}</div><div '
         f'class="seen">{_thumbnails(row.face.capture, link)}</div></article>'
     )
+
+
+def _sentences(problem: str, remedy: str) -> str:
+    return f"{html.escape(problem)} <b>{html.escape(remedy)}</b>"
 
 
 def _kind(state: str) -> str:
@@ -263,7 +238,7 @@ def _kind(state: str) -> str:
 
 
 def _bars(row: ReviewRow) -> str:
-    """A line for each measure: its value, and a bar as long as the share of the others that are better."""
+    """Return a table with a row per measure: its value, and its rank as a bar."""
     lines = "".join(
         f'<tr title="{html.escape(measure.note)}"{" class=worst" if measure.label == row.worst else ""}>'
         f'<th>{measure.label}</th>'
@@ -290,7 +265,7 @@ def _thumbnails(capture: Capture, link: str) -> str:
     if not pictures:
         stage, pattern, words = FIRST_PICTURE
         pictures = [(stage, path, words) for path in sorted(capture.pictures.glob(pattern))[:1]]
-    shown = ""
+    markup = ""
     for stage, path, words in pictures:
         with contextlib.suppress(Problem, OSError):  # a damaged picture is left out
             content, aspect = shrink(path)
@@ -299,30 +274,24 @@ def _thumbnails(capture: Capture, link: str) -> str:
                 f'src="data:image/jpeg;base64,{base64.b64encode(content).decode("ascii")}">'
             )
             picture = f'<a href="{link}{f"#{stage}" if stage else ""}">{picture}</a>' if link else picture
-            shown += f'<div style="flex:{aspect:.3f} 1 0;max-width:{aspect * TALLEST_REM:.2f}rem">{picture}</div>'
-    return shown
+            markup += f'<div style="flex:{aspect:.3f} 1 0;max-width:{aspect * TALLEST_REM:.2f}rem">{picture}</div>'
+    return markup
 
 
 def shrink(path: Path) -> tuple[bytes, float]:
-    """A picture as a JPEG of THUMBNAIL_PX rows, or of fewer where it has no more, and its width by its height. Raises
-    Problem for one that cannot be read."""
+    """Return a picture as a JPEG of at most THUMBNAIL_PX rows, and its aspect ratio. Raises Problem."""
     from ..imaging import images  # needs OpenImageIO
 
     picture = images.read_srgb(path)
     height = min(THUMBNAIL_PX, len(picture))
     with tempfile.TemporaryDirectory(prefix="wildcap_review_") as folder:
-        small = Path(folder) / "small.jpg"
-        images.write_srgb(
-            small,
-            images.resize(picture, max(1, round(picture.shape[1] * height / len(picture))), height),
-            quality=QUALITY,
-        )
+        small, width = Path(folder) / "small.jpg", max(1, round(picture.shape[1] * height / len(picture)))
+        images.write_srgb(small, images.resize(picture, width, height), quality=QUALITY)
         return small.read_bytes(), picture.shape[1] / len(picture)
 
 
 def _link(page: Path, root: Path) -> str:
-    """An address relative to the batch's folder, where the page is there; '' where it is not, or lies on another
-    drive."""
+    """Return an address relative to the batch's folder; '' if the page is missing or on another drive."""
     if not page.is_file():
         return ""
     try:
@@ -337,9 +306,7 @@ def _duration(seconds: float) -> str:
 
 
 def list_riskiest(rows: list[ReviewRow], most: int = 5) -> list[str]:
-    """Lines for the terminal: the first faces of the page, each with why it comes first."""
-
-    def why(row: ReviewRow) -> str:
-        return row.state.words() if row.state.state in ORDER else row.words()
-
-    return [f"{row.face.name:20} {why(row)}" for row in rows[:most]]
+    """Return lines for the terminal: the first faces of the page, each with the reason."""
+    return [
+        f"{row.face.name:20} {row.state.words() if row.state.state in ORDER else row.words()}" for row in rows[:most]
+    ]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How review.html looks, in light and in dark: its frame and its style."""
+"""Frame and style of review.html, for light and dark."""
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1d1d1f; --paper: #fbfaf8; --card: #fff; --faint: #77736c; --line: #dedad3;
@@ -44,7 +44,7 @@ details ul { margin: .3rem 0; padding-left: 1.1rem; } details li { margin: .3rem
 """
 
 MARK = '<meta name="generator" content="WildCap">'
-"""By which a page is told from what somebody else put in its place."""
+"""Tells our page from other files of its name."""
 
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8">{mark}<meta name="viewport" content="width=device-width, initial-scale=1">

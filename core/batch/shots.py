@@ -1,11 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From a table of shots, or a folder of videos, to the faces of a batch. A row that cannot be used is told by its line;
-the others go on.
+"""Faces of a batch from a table of shots or a folder of videos; a row that cannot be used is reported by its line.
 
-The table is CSV with a line of headings: video, and any of name, tone, white, template, quality, settings; as a
-spreadsheet writes it, with commas, semicolons or tabs. Relative paths begin at the table's folder. Standard library
-only.
+The table is CSV as spreadsheets write it, with commas, semicolons or tabs, and a line of headings: video, and any of
+name, tone, white, template, quality, settings. Relative paths begin at the table's folder. Standard library only.
 """
 
 from __future__ import annotations
@@ -27,10 +25,10 @@ from ..worker.command_settings import read_file
 from .record import NAME, BatchFace
 
 COLUMNS = {"tone": ("solve", "skin_tone"), "white": ("solve", "white_point"), "template": ("registration", "template")}
-"""Columns that are settings of their own: (stage, name)."""
+"""Columns that set one setting: (stage, name)."""
 HEADINGS = ("video", "name", *COLUMNS, "quality", "settings")
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm", ".mts", ".3gp")
-"""What counts as a video in a folder of them; a table may name any file."""
+"""Endings of videos in a folder; a table may name any file."""
 MOST_BYTES = 16 << 20
 """Of a table: some hundred thousand rows."""
 
@@ -38,41 +36,27 @@ MOST_BYTES = 16 << 20
 def read_faces(
     shots: Path, root: Path, quality: str, shared: dict, planned: Iterable[BatchFace] = ()
 ) -> tuple[list[BatchFace], list[Problem]]:
-    """The faces of a table or a folder.
+    """Return the faces of a table or folder, and a Problem for each row that was left out.
 
-    Parameters
-    ----------
-    shots : the table, or the folder of videos
-    root : the batch's folder, in which the captures lie
-    quality : preset of the rows that name none
-    shared : settings {stage: {name: value}} that lie under each row's own
-    planned : the batch's faces so far
-
-    Returns
-    -------
-    The faces, and what is wrong with the rows that were left out.
-
-    Raises
-    ------
-    Problem
-        For a table or folder that cannot be read, or has no row.
+    `root` is the batch's folder, `quality` the preset of rows that name none, `shared` the settings {stage: {name:
+    value}} below each row's own, `planned` the batch's faces so far. Raises Problem if nothing can be read.
     """
+    folder = shots if shots.is_dir() else shots.parent
     rows = _rows_of_folder(shots, root) if shots.is_dir() else _rows_of_table(shots)
-    faces, faults, taken = [], [], {}
-    spelled = {_as_a_disk_tells(face.root): face.name for face in planned}
+    faces, faults, places = [], [], {}
+    spelled = {_fold(face.root): face.name for face in planned}
     for place, row in rows:
         try:
-            face = _face(row, shots if shots.is_dir() else shots.parent, root, quality, shared)
-            folder = _as_a_disk_tells(face.root)
-            other = taken.setdefault(folder, place)
-            if other != place:
+            face = _face(row, folder, root, quality, shared)
+            key = _fold(face.root)
+            if places.setdefault(key, place) != place:
                 raise Problem(
-                    f"The name {face.name} is taken by {other}.", "Give each face a name of its own in the column name."
+                    f"The name {face.name} is taken by {places[key]}.",
+                    "Give each face its own name in the column name.",
                 )
-            if spelled.get(folder, face.name) != face.name:
+            if spelled.get(key, face.name) != face.name:
                 raise Problem(
-                    f"The name {face.name} was planned before as {spelled[folder]}, and not every disk tells "
-                    "the two apart.",
+                    f"The name {face.name} was planned before as {spelled[key]}; some disks do not distinguish them.",
                     "Write it as before, or give the face another name in the column name.",
                 )
             faces.append(face)
@@ -86,13 +70,13 @@ def read_faces(
     return faces, faults
 
 
-def _as_a_disk_tells(folder: Path) -> str:
-    """The same for two folders that some disk does not tell apart: ANNA and Anna, or Zoë in one letter and in two."""
+def _fold(folder: Path) -> str:
+    """Return the same text for folders that some disk does not distinguish: ANNA and Anna, or Zoë in NFC and NFD."""
     return unicodedata.normalize("NFC", str(folder)).casefold()
 
 
 def _rows_of_folder(folder: Path, root: Path) -> list[tuple[str, dict[str, str]]]:
-    """Every video of a folder, and every folder in it that is not the batch's or a capture: photographs of one face."""
+    """Return a row for each video, and for each folder that holds photographs of one face."""
     try:
         inside = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
     except OSError as error:
@@ -103,14 +87,13 @@ def _rows_of_folder(folder: Path, root: Path) -> list[tuple[str, dict[str, str]]
         if path.is_dir() and path.absolute() != root and _holds_photographs(path):
             rows.append((path.name, {"video": path.name}))
         elif path.is_file() and path.suffix.lower() in VIDEOS:
-            rows.append(
-                (path.name, {"video": path.name, "name": path.stem if stems.count(path.stem) == 1 else path.name})
-            )
+            name = path.stem if stems.count(path.stem) == 1 else path.name
+            rows.append((path.name, {"video": path.name, "name": name}))
     return rows
 
 
 def _holds_photographs(folder: Path) -> bool:
-    """Whether it holds something, and is neither a batch nor a capture; what may not be looked into is the system's."""
+    """Return whether a folder is not empty, unreadable, a batch or a capture."""
     try:
         return not any((folder / name).exists() for name in (NAME, "capture.json")) and any(folder.iterdir())
     except PermissionError:
@@ -163,20 +146,15 @@ def _rows_of_table(table: Path) -> list[tuple[str, dict[str, str]]]:
 def _check_headings(table: Path, names: list[str]) -> None:
     unknown = [name for name in names if name and name not in HEADINGS]
     if "video" not in names or unknown or any(names.count(name) > 1 for name in names if name):
-        wrong = (
-            f"a column {unknown[0]!r} that means nothing"
-            if unknown
-            else "no column video"
-            if "video" not in names
-            else "a column twice"
-        )
+        missing = "a column twice" if "video" in names else "no column video"
+        wrong = f"an unknown column {unknown[0]!r}" if unknown else missing
         raise Problem(
             f"{table} has {wrong}.", f"Its first line names the columns: video, and any of {', '.join(HEADINGS[1:])}."
         )
 
 
 def _face(row: dict[str, str], folder: Path, root: Path, quality: str, shared: dict) -> BatchFace:
-    """One row's face. Raises Problem."""
+    """Return the face of a row. Raises Problem."""
     if row.get(""):
         raise Problem(
             "It has more cells than there are columns.",
@@ -190,12 +168,12 @@ def _face(row: dict[str, str], folder: Path, root: Path, quality: str, shared: d
             f"There is no video or folder at {source}.", "Check its name and whether the disk it is on is connected."
         )
     name = row.get("name") or source.stem
-    # it becomes a word of commands, and of lists
+    # commands and lists contain it as a word
     if not plain_name(name) or name.startswith("-") or not name.isprintable():
         raise Problem(
             f"{name!r} cannot be the name of a folder.", "Use letters, digits, spaces, hyphens and underscores."
         )
-    settings = {stage: dict(own) if isinstance(own, dict) else own for stage, own in shared.items()}
+    settings = dict(shared)
     if row.get("settings"):
         for stage, own in read_file(Path(absolute_path(row["settings"], folder.absolute()))).items():
             settings[stage] = {**settings.get(stage, {}), **own} if isinstance(own, dict) else own
@@ -205,6 +183,6 @@ def _face(row: dict[str, str], folder: Path, root: Path, quality: str, shared: d
             settings[stage] = {**settings.get(stage, {}), setting: value}
     chosen = row.get("quality") or quality
     described = known.from_json(settings, known.preset(chosen))
-    # what is solved together may be captures that this batch makes
+    # captures that are solved together may be made by this batch
     check_paths(known.from_json({"solve": {"together": ""}}, described), NAMES)
     return BatchFace(name, source, root / f"{name}.wildcap", chosen, settings)

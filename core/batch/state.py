@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a face of a batch is, derived from its capture's own record each time it is asked. Standard library only."""
+"""State of a face in a batch, derived from its capture's record each time. Standard library only."""
 
 from __future__ import annotations
 
@@ -24,8 +24,7 @@ SHEET = "contact_sheet.png"
 
 @dataclass(frozen=True)
 class FaceState:
-    """`state` is one of the five; `group` is the task that is next, or that works or has stopped, None where all are
-    done; `problem` and `remedy` say why it stopped; `machine` names the machine that works on it."""
+    """One of the five states, with its task (None if all are done), the problem that stopped it, and its machine."""
 
     state: str
     group: StageGroup | None = None
@@ -34,28 +33,26 @@ class FaceState:
     machine: str = ""
 
     def words(self) -> str:
-        """For a line of a list."""
-        if self.state == DONE:
-            return "done"
+        """Return the state for a line of a list."""
         label = self.group.label.lower() if self.group else ""
         return {
+            DONE: "done",
             TO_DO: f"{label} is next",
             WORKING: f"{label}: working on {self.machine}",
-            WAITING: "its shadow mask waits to be looked at",
+            WAITING: "its shadow mask waits for review",
             STOPPED: f"{label} stopped: {self.problem} {self.remedy}",
         }[self.state]
 
 
 def derive_state(batch: Batch, face: BatchFace) -> FaceState:
-    """Where a face is. A record that cannot be read counts as stopped."""
+    """Return the state of a face; a record that cannot be read counts as stopped."""
     try:
         capture = face.capture
         group = next((group for group in GROUPS if not is_done(batch, face, group)), None)
         holder = lease.present_holder(capture.lock) if capture.root.is_dir() else None
         if holder is not None:
-            return FaceState(
-                WORKING, group or GROUPS[-1], machine=str(holder.get("host", "another machine")).partition("/")[0]
-            )
+            machine = str(holder.get("host", "another machine")).partition("/")[0]
+            return FaceState(WORKING, group or GROUPS[-1], machine=machine)
         if group is None:
             return FaceState(DONE)
         stopped = capture.read().get("stopped")
@@ -68,13 +65,12 @@ def derive_state(batch: Batch, face: BatchFace) -> FaceState:
 
 
 def waits(batch: Batch, face: BatchFace, group: StageGroup) -> bool:
-    """Whether a task waits for the artist."""
+    """Return whether a task waits for the artist."""
     return group.name == GATE and batch.gate == "artist" and not is_accepted(face.capture)
 
 
 def is_done(batch: Batch, face: BatchFace, group: StageGroup) -> bool:
-    """Whether all stages of a task are finished as this batch asks for them; of the last one, whether it is delivered,
-    too. Raises Problem."""
+    """Return whether a task's stages, and at the last its delivery, are as the batch wants them. Raises Problem."""
     settings = face.chosen()
     if not all(face.capture.state(stage, settings) in FINISHED for stage in group.stages):
         return False
@@ -85,32 +81,30 @@ def is_done(batch: Batch, face: BatchFace, group: StageGroup) -> bool:
 
 
 def deliver_settings(batch: Batch, face: BatchFace) -> dict:
-    """The settings of a face with those of the delivery, as a job has them: with its mesh, which is OBJ where no
-    Blender writes it. In a folder that all deliver to each face has one of its own: plain names may be alike where
-    names are not (delivery_plan.safe_name)."""
+    """Return the settings of a face's delivery, as a job has them.
+
+    It includes the mesh, as OBJ, which needs no Blender. In a shared folder each face gets one of its own, because
+    delivery_plan.safe_name may map two names to one.
+    """
     delivery = {"format": "obj", "whole": True, **(batch.deliver or {})}
-    folder = {"folder": str(Path(delivery["folder"]) / face.name)} if delivery.get("folder") else {}
-    return {**to_json(face.chosen()), "deliver": {**delivery, **folder}}
+    if delivery.get("folder"):
+        delivery["folder"] = str(Path(delivery["folder"]) / face.name)
+    return {**to_json(face.chosen()), "deliver": delivery}
 
 
 def is_delivered(batch: Batch, face: BatchFace) -> bool:
-    """Whether the delivery that is asked for is there, whole, and made of the stages as they stand now. Raises Problem
-    for settings that do not fit."""
+    """Return whether the delivery is complete and made from the current stages. Raises Problem for invalid settings."""
     plan = delivery_plan.plan(face.capture, from_json(deliver_settings(batch, face)).deliver)
     try:
-        told = read_json(plan.target / delivery_plan.PROVENANCE)
-        made_of = {name: done["finished"] for name, done in told["stages"].items()}
+        provenance = read_json(plan.target / delivery_plan.PROVENANCE)
+        made_from = {name: done["finished"] for name, done in provenance["stages"].items()}
         now = {name: done["finished"] for name, done in face.capture.read()["stages"].items()}
-        return made_of == now and all((plan.target / name).is_file() for name in told["files"])
+        return made_from == now and all((plan.target / name).is_file() for name in provenance["files"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return False
 
 
 def has_sheet(capture: Capture) -> bool:
-    """Whether the contact sheet is there and not older than the maps that it shows."""
-
-    def age(path: Path) -> float:
-        return path.stat().st_mtime
-
+    """Return whether there is a contact sheet that is not older than the maps it shows."""
     sheet, maps = capture.renders / SHEET, capture.maps_4k / "diffuse_albedo.png"
-    return sheet.is_file() and maps.is_file() and age(sheet) >= age(maps)
+    return sheet.is_file() and maps.is_file() and sheet.stat().st_mtime >= maps.stat().st_mtime

@@ -1,10 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One task of one face, run on this machine by a worker in a process of its own: what every kind of batch comes down
-to. Standard library only.
+"""One task of one face, run by a worker process on this machine; every kind of batch uses it. Standard library only.
 
-Asked for what is done already, it ends well within seconds. The worker ends with the process that asked for it, however
-that ends.
+A task that is already done ends within seconds. The worker ends with the process that started it.
 """
 
 from __future__ import annotations
@@ -15,11 +13,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from ..capture import switchlight_api
 from ..capture.capture import Capture
-from ..capture.messages import Cancelled, CancelledError, Done, Failed, Log, Message, Problem
+from ..capture.messages import FINAL, Cancelled, CancelledError, Done, Failed, Log, Message, Problem
 from ..worker.client import THREAD_VARIABLES, Worker
 from ..worker.job import read_job, wait_until_free, write_job
 from .groups import DELIVER, GROUPS, StageGroup
@@ -38,40 +37,30 @@ def run_task(
     cancelled: Callable[[], bool] = lambda: False,
     threads: int | None = None,
 ) -> Message:
-    """Runs a task.
+    """Run a task and return its final message; `hear` takes the others.
 
-    Parameters
-    ----------
-    batch, face, group : whose task
-    hear : takes what its worker says
-    cancelled : whether it is to end
-    threads : how many its libraries may start, where other tasks run beside it; None: as many as the worker takes by
-        itself
-
-    Returns
-    -------
-    The final message: Done, Cancelled or Failed.
+    `threads` limits the libraries' threads where other tasks run beside this one.
     """
     environment = {} if threads is None else {name: str(threads) for name in THREAD_VARIABLES}
     began, capture = time.monotonic(), face.capture
+    follow = partial(_follow, capture, hear, cancelled, environment)
     try:
         if waits(batch, face, group):
             raise Problem(
-                f"The shadow mask of {face.name} waits to be looked at.",
-                f"Open the batch in Blender, or accept it as it is: `python -m core batch accept "
+                f"The shadow mask of {face.name} waits for review.",
+                f"Open the batch in Blender, or accept the mask: `python -m core batch accept "
                 f"{batch.root} {face.name}`.",
             )
         wait_until_free(capture, lambda text: hear(Log(text)), cancelled)
-        job = write_job(
-            capture,
-            source=face.source if group is GROUPS[0] else "",
-            last=group.last,
-            settings=face.settings,
-            quality=face.quality,
-        )
-        final = _follow(capture, job, hear, cancelled, environment)
-        if group.name == DELIVER and isinstance(final, Done):
-            final = _deliver(batch, face, hear, cancelled, environment)
+        source = face.source if group is GROUPS[0] else ""
+        final = follow(write_job(capture, source=source, last=group.last, settings=face.settings, quality=face.quality))
+        if group.name == DELIVER and isinstance(final, Done) and batch.deliver is not None:
+            if not is_delivered(batch, face):
+                final = follow(write_job(capture, tool="deliver", settings=deliver_settings(batch, face)))
+                # `status` and Blender judge the stages by job.json
+                write_job(capture, last=group.last, settings=face.settings, quality=face.quality)
+        if group.name == DELIVER and isinstance(final, Done) and batch.blender and not has_sheet(capture):
+            final = _render_sheet(batch.blender, capture, hear, cancelled)
     except CancelledError:
         return Cancelled(group.last)
     except Problem as problem:
@@ -81,89 +70,62 @@ def run_task(
 
 def _follow(
     capture: Capture,
-    job: Path,
     hear: Callable[[Message], None],
     cancelled: Callable[[], bool],
     environment: dict[str, str],
+    job: Path,
 ) -> Message:
-    """Runs a job to its end and returns its final message. A worker that dies is started once more, for what killed it
-    may have been the task beside it."""
-    for again in (False, True):
-        worker = Worker(Path(sys.executable), ROOT, job, capture.logs / "worker.log", {**environment, **_paid_key(job)})
-        final = _listen(worker, hear, cancelled)
-        if again or not worker.died:
-            return final
-        hear(Log(f"{final.problem} It is begun once more."))
+    """Run a job and return its final message; restart once a worker that dies, perhaps for want of memory."""
+    final, died = _run_worker(capture, hear, cancelled, environment, job)
+    if died:
+        hear(Log(f"{final.problem} It is started once more."))
         wait_until_free(capture, lambda text: hear(Log(text)), cancelled)
-    raise AssertionError
+        final, _ = _run_worker(capture, hear, cancelled, environment, job)
+    return final
 
 
-def _listen(worker: Worker, hear: Callable[[Message], None], cancelled: Callable[[], bool]) -> Message:
-    """Runs a worker to its end and returns its final message."""
+def _run_worker(
+    capture: Capture,
+    hear: Callable[[Message], None],
+    cancelled: Callable[[], bool],
+    environment: dict[str, str],
+    job: Path,
+) -> tuple[Message, bool]:
+    """Return a worker's final message, and whether it died."""
+    worker = Worker(Path(sys.executable), ROOT, job, capture.logs / "worker.log", {**environment, **_paid_key(job)})
     worker.start()
     try:
         while True:
             for message in worker.poll():
-                if not worker.running and isinstance(message, Done | Cancelled | Failed):
-                    return message
+                if isinstance(message, FINAL):
+                    return message, worker.died
                 hear(message)
             if cancelled():
                 worker.cancel()
             time.sleep(POLL_S)
     finally:
-        worker.terminate()  # where it was left by an exception
+        worker.terminate()  # after an exception
 
 
 def _paid_key(job: Path) -> dict[str, str]:
-    """The key of a paid service that this process was started with, for a job that asks for that service, and for no
-    other."""
+    """Return this process's key of the paid service, for a job that uses the service only."""
     key = os.environ.get(switchlight_api.KEY_VARIABLE)
-    return (
-        {switchlight_api.KEY_VARIABLE: key} if key and read_job(job).settings.delight.delighter == "switchlight" else {}
-    )
-
-
-def _deliver(
-    batch: Batch,
-    face: BatchFace,
-    hear: Callable[[Message], None],
-    cancelled: Callable[[], bool],
-    environment: dict[str, str],
-) -> Message:
-    """What comes after the last stage: the delivery, and the contact sheet. Raises Problem."""
-    capture, final = face.capture, Done(0.0)
-    if batch.deliver is not None and not is_delivered(batch, face):
-        final = _follow(
-            capture,
-            write_job(capture, tool="deliver", settings=deliver_settings(batch, face)),
-            hear,
-            cancelled,
-            environment,
-        )
-        # job.json is what the stages are judged by in `status` and in Blender
-        write_job(capture, last=GROUPS[-1].last, settings=face.settings, quality=face.quality)
-    if isinstance(final, Done) and batch.blender and not has_sheet(capture):
-        final = _render_sheet(batch.blender, capture, hear, cancelled)
-    return final
+    is_paid = key and read_job(job).settings.delight.delighter == "switchlight"
+    return {switchlight_api.KEY_VARIABLE: key} if is_paid else {}
 
 
 def _render_sheet(
     blender: str, capture: Capture, hear: Callable[[Message], None], cancelled: Callable[[], bool]
 ) -> Message:
-    """The contact sheet, by a Blender that has the extension. Raises Problem where it cannot be started, or gives
-    none."""
+    """Render the contact sheet with a Blender that has the extension. Raises Problem if it does not."""
     hear(Log("Rendering the contact sheet"))
     capture.logs.mkdir(parents=True, exist_ok=True)
     log = capture.logs / "contact_sheet.log"
-    with open(log, "wb") as told:
+    command = [blender, "--command", "wildcap", "contact_sheet", str(capture.root)]
+    environment = switchlight_api.environment_without_key()
+    with open(log, "wb") as output:
         try:
-            process = subprocess.Popen(
-                [blender, "--command", "wildcap", "contact_sheet", str(capture.root)],
-                stdin=subprocess.DEVNULL,
-                stdout=told,
-                stderr=told,
-                env=switchlight_api.environment_without_key(),
-            )
+            process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, env=environment)
         except OSError as error:
             raise Problem(
                 f"Blender could not be started as {blender} ({error.strerror or error}).",

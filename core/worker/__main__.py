@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """python -E -s -B -m core.worker JOB.json: the worker's side of the protocol.
 
-JSON lines leave by the real stdout, which is kept away from everybody else; everything printed goes to stderr, a log
-file. stdin brings the line `cancel`; its end means that whoever started the worker is gone.
+Messages leave as JSON lines by the real stdout, which no library can reach; whatever is printed goes to stderr, a log
+file. stdin brings the line `cancel`; its end means that the starter is gone.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..capture.messages import Message, to_line
 from .runner import run_job
 
 NICE_VALUE = 15
-"""Nice value: beside a Blender that wants all of the processor, the worker gets a thirtieth of it."""
+"""Gives the worker a thirtieth of the processor beside a busy Blender."""
 
 
 def main() -> None:
@@ -39,20 +39,18 @@ def main() -> None:
 
 
 def _step_back() -> None:
-    """Lowers the priority, so that whatever the artist does in Blender comes first; an idle Blender costs the worker
-    nothing.
+    """Lower the priority, so that Blender comes first.
 
-    Linux desktops share the processor between sessions first (sched(7), "The autogroup feature"). A worker is a session
-    of its own, so its nice value alone says nothing to Blender: that of its group does.
+    Linux desktops share the processor between sessions first (sched(7), "The autogroup feature"), and a worker is a
+    session of its own: its group's nice value counts.
     """
     os.nice(NICE_VALUE)
-    # only there on such a Linux
     with contextlib.suppress(OSError), open("/proc/self/autogroup", "w", encoding="ascii") as group:
         group.write(str(NICE_VALUE))
 
 
 def _take_stdout():
-    """A function that sends a message by the real stdout; afterwards descriptor 1 is stderr, also for C++."""
+    """Return a function that sends messages by the real stdout; make descriptor 1 stderr, also for C++."""
     channel = os.dup(1)
     os.dup2(2, 1)
     lock = threading.Lock()

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work that needs no worker's Python and must not hold Blender up: one function in a thread, polled like a Worker.
+"""Work that needs no worker and must not block Blender: one function in a thread, polled like a Worker.
 
-Ground floor: standard library only.
+Standard library only.
 """
 
 from __future__ import annotations
@@ -20,15 +20,13 @@ from ..capture import switchlight_api, unforeseen
 from ..capture.messages import FINAL, Cancelled, CancelledError, Done, Failed, Message, Problem, Progress
 
 PLACES = frozenset({"PIP_USER", "PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "PIP_CONSTRAINT"})
-"""Environment variables of pip's that would have packages elsewhere than in the environment they are for, or others
-than a lock says."""
+"""pip's environment variables that would put packages elsewhere, or bring others than a lock says."""
 GRACE_S = 1.0
-"""How long a cancelled task's thread may take to end before it is waited for no longer."""
+"""Longest time that `poll` waits for the thread of a cancelled task."""
 
 
 class BackgroundTask:
-    """`work(task)` in a thread. It may call `task.say` and `task.run`; what it returns is `result`, and a Problem it
-    raises ends it as Failed."""
+    """`work(task)` in a thread; it may call `task.say` and `task.run`. Its return value becomes `result`."""
 
     def __init__(self, name: str, work: Callable[[BackgroundTask], object]):
         self.name = name
@@ -46,8 +44,7 @@ class BackgroundTask:
         self._thread.start()
 
     def poll(self) -> list[Message]:
-        """The messages since the last call; the last of all is Done, Cancelled or Failed. After a cancel the thread is
-        waited for a second at most."""
+        """Return the messages since the last call; the last of all is Done, Cancelled or Failed."""
         if self.running and self._cancelled_at is not None:
             self.running = self._thread.is_alive() and time.monotonic() - self._cancelled_at < GRACE_S
             return [] if self.running else [Cancelled(self.name)]
@@ -68,22 +65,22 @@ class BackgroundTask:
         return self._cancelled_at is not None
 
     def check(self) -> None:
-        """Raises CancelledError where the task was cancelled: whoever did so takes the work for ended within GRACE_S,
-        and may begin another in the same place."""
+        """Raise CancelledError if the task was cancelled: other work may begin in the same place after GRACE_S."""
         if self.cancelled:
             raise CancelledError(self.name)
 
     def say(self, done: float, of: float, text: str) -> None:
-        """Raises CancelledError as `check`."""
+        """Report progress. Raises CancelledError."""
         self.check()
         self._messages.put(Progress(self.name, done, of, text))
 
     def run(
         self, command: list, hear: Callable[[str], None] = lambda line: None, limit_s: float = threading.TIMEOUT_MAX
     ) -> tuple[int, str]:
-        """Runs a command, for `limit_s` at most, each line it writes through `hear`; its exit code and the last line
-        with an error in it. Raises OSError when it cannot be started, and CancelledError where the task is cancelled
-        before or meanwhile."""
+        """Run a command, kill it after `limit_s`, and return its exit code and the last line that contains "error".
+
+        `hear` takes each line of its output. Raises OSError if it cannot be started, and CancelledError.
+        """
         self.check()
         apart = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {"start_new_session": True}
         environment = {
@@ -119,7 +116,7 @@ class BackgroundTask:
         return code, last_error
 
     def _kill(self) -> None:
-        """Ends the running command and, where the system can, what that has started (venv runs pip's own installer)."""
+        """End the running command and, except on Windows, its children (venv runs pip's installer)."""
         if self._process is None or self._process.poll() is not None:
             return
         with contextlib.suppress(OSError):  # it has just ended by itself
@@ -137,7 +134,7 @@ class BackgroundTask:
             final = Cancelled(self.name)
         except Problem as problem:
             final = Failed(self.name, problem.problem, problem.remedy)
-        except Exception as error:  # a thread has nobody above it: an artist reads problems, not tracebacks
+        except Exception as error:
             problem = unforeseen.explain(error, self.name)
             final = Failed(self.name, problem.problem, problem.remedy)
         self._messages.put(final)

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An empty Python environment with pip in it, made from a Python that may lack venv, ensurepip and pip, as Blender's
-own may.
+"""An empty environment with pip, from a Python that may lack venv, ensurepip and pip, as Blender's may.
 
-Standard library only. What is missing is made up for: the folder by hand, as PEP 405 has it, and pip from its wheel,
-whose hash requirements/locks/pip.txt has.
+Without them the folder is made by hand after PEP 405, and pip comes from its wheel, which requirements/locks/pip.txt
+pins by its hash. Standard library only.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from . import pip_source
 from .environment import answer, empty, python_of
 
 Run = Callable[[list], tuple[int, str]]
-"""Runs a command; its exit code and the last line with an error in it."""
+"""Runs a command and returns its exit code and last error."""
 
 
 def make(
@@ -35,28 +34,11 @@ def make(
     wheel_only: bool = False,
     keep: str = "",
 ) -> Path:
-    """Makes an environment anew.
+    """Make an environment from the Python `base` and return its Python.
 
-    Parameters
-    ----------
-    folder : for it; what is there goes
-    base : the Python to make it from
-    requirements : the folder of requirements and locks
-    run : runs a command
-    wheels : the folder to take pip from in place of an index, or None
-    wheel_only : takes pip from its wheel even where Python brings one
-    keep : the one file in the folder that stays, '' for none
-
-    Returns
-    -------
-    The environment's Python.
-
-    Raises
-    ------
-    Problem
-        Where none can be made, or pip does not work in it.
+    The folder is emptied but for the file `keep`. pip comes from the folder `wheels` or, without one, from the index,
+    where Python brings none; with `wheel_only` always. Raises Problem if no environment with a working pip can be made.
     """
-    folder = Path(folder)
     empty(folder, keep)
     code, error = run([base, "-I", "-m", "venv", "--without-pip", folder])
     if code:
@@ -76,33 +58,30 @@ def make(
 
 
 def unpack_pip(folder: Path, wheel: bytes) -> None:
-    """Puts a wheel of pure Python into an environment: its files as they are, which is all that one without scripts
-    needs."""
-    said = answer(python_of(folder), "import sysconfig; print(sysconfig.get_paths()['purelib'])")
-    if not said:
+    """Unpack a wheel of pure Python into an environment, which is enough for one without scripts. Raises Problem."""
+    packages = answer(python_of(folder), "import sysconfig; print(sysconfig.get_paths()['purelib'])")
+    if not packages:
         raise Problem(
             f"The environment {folder} does not answer.", "Click Use an Existing Python, or choose another folder."
         )
     try:
         with zipfile.ZipFile(io.BytesIO(wheel)) as file:
-            file.extractall(said)
+            file.extractall(packages)
     except OSError as error:
         raise storage_problem(error, folder) from error
 
 
 def _by_hand(folder: Path, base: Path) -> None:
-    """What the module venv makes, without it: pyvenv.cfg, the interpreter and the folder of packages (PEP 405)."""
-    said = answer(
-        base, "import sys; print(sys._base_executable); print('%d.%d.%d' % sys.version_info[:3])"
-    ).splitlines()
-    if len(said) != 2:
+    """Make pyvenv.cfg, the interpreter and the folder of packages, as venv would (PEP 405). Raises Problem."""
+    code = "import sys; print(sys._base_executable); print('%d.%d.%d' % sys.version_info[:3])"
+    facts = answer(base, code).splitlines()
+    if len(facts) != 2:
         raise Problem(f"{base} is not a working Python.", "Click Use an Existing Python, or install Blender again.")
-    real, version = Path(said[0]), said[1]
-    python = python_of(folder)
-    short = ".".join(version.split(".")[:2])
+    real, version, python = Path(facts[0]), facts[1], python_of(folder)
+    short = version.rpartition(".")[0]
     try:
         python.parent.mkdir(parents=True, exist_ok=True)
-        if os.name == "nt":  # links need a privilege there; an interpreter finds its libraries beside itself
+        if os.name == "nt":  # links need a privilege; an interpreter finds its libraries beside itself
             (folder / "Lib" / "site-packages").mkdir(parents=True, exist_ok=True)
             for path in real.parent.iterdir():
                 if re.fullmatch(r"(python|pythonw)\.exe|(python|vcruntime)\w*\.dll", path.name, re.IGNORECASE):

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The commands about a capture that is there, and what people bring into it by hand: python -m core status, delete,
-report-problem, mask and landmarks. Standard library only."""
+"""Commands about an existing capture: python -m core status, delete, report-problem, mask and landmarks.
+
+Standard library only.
+"""
 
 from __future__ import annotations
 
@@ -19,46 +21,33 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def add_commands(commands) -> None:
-    """Adds them to the subparsers of `python -m core`."""
-    add_command(commands, "status", _status, "say which stages of a capture are done", "CAPTURE")
-    gone = add_command(
-        commands,
-        "delete",
-        _delete,
-        "delete a face: all that WildCap wrote of it; without --yes, list what would go and what would stay",
-        "CAPTURE",
-    )
-    gone.add_argument("--yes", action="store_true", help="delete it, for good")
-    about = add_command(
-        commands,
-        "report-problem",
-        _report_problem,
-        "write a zip to send: logs, versions, settings; no pictures, names or paths",
-    )
+    """Add the commands to the subparsers of `python -m core`."""
+    add_command(commands, "status", _status, "show which stages of a capture are done", "CAPTURE")
+    delete = add_command(commands, "delete", _delete, "list what WildCap wrote of a face, or delete it", "CAPTURE")
+    delete.add_argument("--yes", action="store_true", help="delete it, for good")
+    words = "write a zip to send: logs, versions, settings; no pictures, names or paths"
+    about = add_command(commands, "report-problem", _report_problem, words)
     about.add_argument("capture", metavar="CAPTURE", type=Path, nargs="?")
     about.add_argument("--to", metavar="ZIP", type=Path, required=True)
-    mask = commands.add_parser("mask", help="bring a painted shadow mask in")
+    mask = commands.add_parser("mask", help="import a painted shadow mask")
     mask = mask.add_subparsers(required=True, metavar="import")
-    bring = add_command(
-        mask, "import", _mask_import, "make a picture the capture's shadow mask: white is shadow", "CAPTURE"
-    )
+    bring = add_command(mask, "import", _mask_import, "use a picture as the shadow mask: white is shadow", "CAPTURE")
     bring.add_argument("picture", metavar="PNG", type=Path)
-    marks = commands.add_parser("landmarks", help="put landmarks by hand; they win over what was found")
+    marks = commands.add_parser("landmarks", help="set landmarks by hand, in place of the detected ones")
     marks = marks.add_subparsers(required=True, metavar="set|free|import")
-    put = add_command(marks, "set", _landmarks, "put one landmark at a place of the capture's world", "CAPTURE")
+    put = add_command(marks, "set", _landmarks, "set one landmark in the capture's world", "CAPTURE")
     put.add_argument("index", metavar="INDEX", help="0 to 467, as in landmarks.json")
     for axis in "XYZ":
         put.add_argument(axis.lower(), metavar=axis, type=float, help="metres")
-    free = add_command(marks, "free", _landmarks, "let the frames say again where a landmark is", "CAPTURE")
+    free = add_command(marks, "free", _landmarks, "return one landmark to its detected place", "CAPTURE")
     free.add_argument("index", metavar="INDEX")
-    many = add_command(
-        marks, "import", _landmarks, 'take the points of a JSON file: {"points": {"152": [x, y, z]}}, metres', "CAPTURE"
-    )
+    words = 'read landmarks from a JSON file: {"points": {"152": [x, y, z]}}, metres'
+    many = add_command(marks, "import", _landmarks, words, "CAPTURE")
     many.add_argument("file", metavar="JSON", type=Path)
 
 
 def _status(options: argparse.Namespace) -> int:
-    """States under the settings of the last job."""
+    """Print the stages' states under the settings of the last job."""
     capture = Capture(options.capture)
     if not capture.root.is_dir():
         raise Problem(

@@ -1,13 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Starts a worker and reads it without ever waiting: what Blender and the command line share.
+"""A worker process as Blender and the command line see it, read without ever waiting.
 
-Ground floor: standard library only. A job file goes in; messages come out of `Worker.poll`, the last of them always
-Done, Cancelled or Failed. A reader thread only fills a queue, so nothing here touches the caller from a thread.
+A job file goes in; messages come out of `Worker.poll`, the last of them always Done, Cancelled or Failed. A reader
+thread only fills a queue, so nothing calls the host from a thread. Standard library only.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import queue
 import subprocess
@@ -20,7 +21,7 @@ from ..capture.files import storage_problem
 from ..capture.messages import FINAL, Cancelled, Failed, Log, Message, Problem, from_line
 
 GRACE_S = 0.7
-"""How long a cancelled worker may take to reach its next report before it is stopped."""
+"""Time for a cancelled worker to reach its next report before it is killed."""
 
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -30,18 +31,18 @@ THREAD_VARIABLES = (
     "VECLIB_MAXIMUM_THREADS",
 )
 SPINS = {"GOMP_SPINCOUNT": "2000"}
-"""How long a thread of GCC's OpenMP (PyTorch's on Linux) spins before it sleeps while it waits for the others: its own
-300,000 keep a core from the very thread that is waited for when Blender, or anything else, is busy on another core, and
-everything stands still for its time slice."""
+"""Rounds that a waiting thread of GCC's OpenMP (PyTorch's on Linux) spins before it sleeps. With the default of 300,000
+it keeps the core from the very thread it waits for when another program, such as Blender, is busy."""
 
 
 class Worker:
-    """One job in a process of its own. `poll` it several times a second until it is no longer `running`."""
+    """One job in its own process. `poll` it several times a second until it is no longer `running`."""
 
     def __init__(self, python: Path, root: Path, job: Path, log: Path, environment: dict[str, str] | None = None):
-        """`python` runs the job file `job` with the code under `root` (the folder that holds core/); stderr goes to
-        `log`. `environment` lies over the caller's: what the worker is to know and no file and no command line may
-        hold."""
+        """Prepare `python` to run a job file with the code in `root` (the folder that holds core/).
+
+        stderr goes to `log`. `environment` lies over the caller's, for secrets that no file or command line may hold.
+        """
         self.python = Path(python)
         self.root = Path(root)
         self.job = Path(job)
@@ -53,32 +54,24 @@ class Worker:
         self._cancelled_at: float | None = None
         self._ended = False
         self.died = False
-        """Whether the process ended without a final message of its own, and nobody had asked it to."""
+        """True if the process ended without a final message, and nobody had cancelled it."""
 
     @property
     def running(self) -> bool:
-        """True from `start` until `poll` has handed out the final message."""
+        """True from `start` until `poll` has returned the final message."""
         return self._process is not None and not self._ended
 
     def start(self) -> None:
-        """Starts the process. Raises Problem when the log cannot be written or the Python cannot be started."""
+        """Start the process. Raises Problem if the log cannot be written or the Python cannot be started."""
         assert self._process is None, "a Worker runs one job"
         try:
             self.log.parent.mkdir(parents=True, exist_ok=True)
             log = open(self.log, "wb")
         except OSError as error:
             raise storage_problem(error, self.log) from error
-        command = [
-            str(self.python),
-            "-E",
-            "-s",
-            "-B",
-            "-X",
-            "utf8",
-            "-m",
-            f"{_package()}.worker",
-            str(self.job.absolute()),
-        ]
+        package = __package__.split(".")[-2]  # core, whatever it is called inside Blender
+        options = ("-E", "-s", "-B", "-X", "utf8", "-m", f"{package}.worker")
+        command = [str(self.python), *options, str(self.job.absolute())]
         with log:
             try:
                 self._process = subprocess.Popen(
@@ -98,7 +91,7 @@ class Worker:
         threading.Thread(target=self._read, name="wildcap-worker-reader", daemon=True).start()
 
     def poll(self) -> list[Message]:
-        """The messages that came since the last call, without waiting. The last of all is a final one, exactly once."""
+        """Return the messages since the last call, without waiting. The last of all is a final one, exactly once."""
         if not self.running:
             return []
         if self._cancelled_at is not None and time.monotonic() - self._cancelled_at > GRACE_S:
@@ -117,18 +110,16 @@ class Worker:
         return messages
 
     def cancel(self) -> None:
-        """Asks the worker to stop at its next report; `poll` ends it after the grace time and then says Cancelled."""
+        """Ask the worker to stop at its next report; `poll` kills it after the grace time."""
         if not self.running or self._cancelled_at is not None:
             return
         self._cancelled_at = time.monotonic()
-        try:
+        with contextlib.suppress(OSError):  # it has just ended by itself
             self._process.stdin.write(b"cancel\n")
             self._process.stdin.flush()
-        except OSError:
-            pass  # it has just ended by itself; poll says how
 
     def terminate(self) -> None:
-        """Ends the process at once, for a host that is closing. `poll` then says Cancelled."""
+        """Kill the process, for a host that is closing; `poll` then returns Cancelled."""
         if self.running:
             self._cancelled_at = self._cancelled_at or time.monotonic()
             self._kill()
@@ -139,7 +130,7 @@ class Worker:
             self._process.kill()
 
     def _read(self) -> None:
-        """The reader thread: lines to messages, then the exit code."""
+        """Queue the messages, then the exit code: the reader thread."""
         with self._process.stdout as lines:
             for line in lines:
                 try:
@@ -147,14 +138,12 @@ class Worker:
                 except ValueError:
                     self._messages.put(Log(line.decode("utf-8", "replace").rstrip()))
         code = self._process.wait()
-        try:
+        with contextlib.suppress(OSError):
             self._process.stdin.close()
-        except OSError:
-            pass
         self._messages.put(code)
 
     def _without_farewell(self, code: int) -> Message:
-        """The final message of a process that ended without one."""
+        """Return the final message for a process that ended without one."""
         if self._cancelled_at is not None:
             return Cancelled(self._stage)
         self.died = True
@@ -175,14 +164,11 @@ class Worker:
         )
 
 
-def _package() -> str:
-    """The name under which the worker imports this code: core, whatever it is called inside Blender."""
-    return __package__.split(".")[-2]
-
-
 def _environment(own: dict[str, str]) -> dict[str, str]:
-    """The caller's environment with the thread count of the libraries set and how they wait, unless the user has set
-    it; `own` lies over it. The key of a paid service is passed on by those alone who have it in `own`."""
+    """Return the caller's environment below `own`, with the libraries' threads limited unless the user has done so.
+
+    The key of a paid service is passed on only as part of `own`.
+    """
     affinity = getattr(os, "sched_getaffinity", None)
     cores = len(affinity(0)) if affinity else os.cpu_count() or 1
     threads = str(cores if cores <= 2 else cores - 1)
@@ -190,14 +176,11 @@ def _environment(own: dict[str, str]) -> dict[str, str]:
 
 
 def _apart() -> dict:
-    """Popen arguments: out of reach of the terminal's Ctrl-C, without a console window, below normal priority.
+    """Return Popen arguments: out of reach of Ctrl-C, without a console window, below normal priority.
 
-    On POSIX the worker lowers its own priority, because a function run between fork and exec is unsafe with threads.
+    On POSIX the worker lowers its own priority, because code between fork and exec is unsafe with threads.
     """
-    if os.name == "nt":
-        return {
-            "creationflags": subprocess.CREATE_NO_WINDOW
-            | subprocess.BELOW_NORMAL_PRIORITY_CLASS
-            | subprocess.CREATE_NEW_PROCESS_GROUP
-        }
-    return {"start_new_session": True}
+    if os.name != "nt":
+        return {"start_new_session": True}
+    flags = subprocess.CREATE_NO_WINDOW | subprocess.BELOW_NORMAL_PRIORITY_CLASS | subprocess.CREATE_NEW_PROCESS_GROUP
+    return {"creationflags": flags}

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings on the command line: --set and --settings for every one, a flag for those that have one, and the list of
-all.
+"""Settings on the command line: --set and --settings for all, flags for some, and the list of all.
 
-Ground floor: standard library only. Names, types, choices and help come from the fields in settings/settings.py and
-settings/stage_settings.py.
+Names, types, choices and help come from the fields in settings/settings.py and settings/stage_settings.py. Standard
+library only.
 """
 
 from __future__ import annotations
@@ -21,15 +20,14 @@ from ..settings.settings import STAGE_KINDS, Settings, find_setting, from_json, 
 
 METAVARS = {"file": "FILE", "folder": "FOLDER", "file_or_folder": "PATH"}
 COMMANDS = {name: "deliver" if name.startswith("deliver.") else "run" for name in known_settings()}
-"""The command that each setting is for."""
+"""Setting -> the command it is for."""
 WIDTH = 120  # columns of the terminal
 
 
 def add_options(parser: argparse.ArgumentParser, command: str) -> None:
-    """Gives the parser of a command ('run' or 'deliver') --settings, --set, and the flags of the command's own
-    settings.
+    """Add --settings, --set and the flags of a command ('run' or 'deliver') to its parser.
 
-    What is not given leaves nothing in the parsed options but `settings_file` None and `assignments` [].
+    Without any, the parsed options contain only `settings_file` None and `assignments` [].
     """
     add_assignments(parser, command)
     for name, field in known_settings().items():
@@ -38,12 +36,10 @@ def add_options(parser: argparse.ArgumentParser, command: str) -> None:
 
 
 def add_assignments(parser: argparse.ArgumentParser, command: str) -> None:
-    """Gives the parser --settings and --set alone."""
-    example = (
-        '{"solve": {"steps": 30}, "seed": 1}; its values replace those of the quality'
-        if command == "run"
-        else '{"deliver": {"preset": "unreal"}}'
-    )
+    """Add --settings and --set to a parser."""
+    example = '{"deliver": {"preset": "unreal"}}'
+    if command == "run":
+        example = '{"solve": {"steps": 30}, "seed": 1}; its values replace those of the quality'
     parser.add_argument(
         "--settings",
         dest="settings_file",
@@ -63,11 +59,10 @@ def add_assignments(parser: argparse.ArgumentParser, command: str) -> None:
 
 
 def read_options(options: argparse.Namespace, command: str) -> dict:
-    """The settings that a command line asks for, as a job has them: {stage: {name: value}, seed, device}. Paths are
-    absolute.
+    """Return the settings of a command line as a job has them: {stage: {name: value}, seed, device}.
 
-    --set and flags lie over the file. Raises Problem for what is no setting or of another command, for a value that
-    cannot be, a file that cannot be read, and where one setting is to have two values.
+    --set and flags lie over the file; paths are absolute. Raises Problem for an invalid setting or value, an unreadable
+    file, and two values for one setting.
     """
     settings = read_file(options.settings_file) if options.settings_file else {}
     overrides: dict[str, tuple[str, object]] = {}
@@ -83,8 +78,7 @@ def read_options(options: argparse.Namespace, command: str) -> dict:
 
 
 def read_file(path: Path) -> dict:
-    """The settings in a JSON file, its relative paths made absolute from its folder. Raises Problem for a file that is
-    not there or not of settings."""
+    """Read the settings of a JSON file; relative paths begin at its folder. Raises Problem."""
     path = Path(absolute_path(str(path)))
     try:
         settings = read_json(path)
@@ -94,20 +88,15 @@ def read_file(path: Path) -> dict:
             'It is a JSON file like {"solve": {"steps": 30}, "seed": 1}.',
         ) from error
     from_json(settings)
-    return {
-        stage: {
-            name: absolute_path(value, path.parent) if "path" in find_setting(f"{stage}.{name}").metadata else value
-            for name, value in own.items()
-        }
-        if stage in STAGE_KINDS
-        else own
-        for stage, own in settings.items()
-    }
+    for stage in settings.keys() & STAGE_KINDS.keys():
+        for name, value in settings[stage].items():
+            if "path" in find_setting(f"{stage}.{name}").metadata:
+                settings[stage][name] = absolute_path(value, path.parent)
+    return settings
 
 
 def refuse_lone_flags(options: argparse.Namespace, by_stage: dict) -> None:
-    """Raises Problem for a flag of `run` that means something beside another setting only; `by_stage` are those of
-    `read_options`."""
+    """Raise Problem for a flag of `run` without the setting it needs; `by_stage` comes from `read_options`."""
     given = vars(options)
     delighter = by_stage.get("delight", {}).get("delighter")
     for name, wanted in (("delight.folder", "folder"), ("delight.checkpoint", "opendelight")):
@@ -128,7 +117,7 @@ def refuse_lone_flags(options: argparse.Namespace, by_stage: dict) -> None:
 
 
 def list_settings() -> str:
-    """Every setting for a terminal: name, default, what it may be, its flag; below that its tooltip."""
+    """Describe all settings for a terminal: name, default, values, flag and tooltip."""
     lines = []
     for name, field in known_settings().items():
         flag = f"  ({COMMANDS[name]} {_flag_words(field)})" if "flag" in field.metadata else ""
@@ -138,37 +127,29 @@ def list_settings() -> str:
 
 
 def _argument(name: str, field: Field) -> dict:
-    """What argparse is told of a setting's flag, but for its name."""
+    """Return the arguments of add_argument for a setting's flag."""
     tooltip = _tooltip(name).replace("%", "%%")
     if isinstance(field.default, bool):
-        return {
-            "action": "store_const",
-            "const": not field.default,
-            "help": f"switches off: {tooltip}" if field.default else tooltip,
-        }
+        help_text = f"switches off: {tooltip}" if field.default else tooltip
+        return {"action": "store_const", "const": not field.default, "help": help_text}
     choices = field.metadata.get("choices")
-    return {
-        "type": type(field.default),
-        "help": tooltip,
-        **({"choices": choices} if choices else {"metavar": _metavar(field)}),
-    }
+    values = {"choices": choices} if choices else {"metavar": _metavar(field)}
+    return {"type": type(field.default), "help": tooltip, **values}
 
 
 def _metavar(field: Field) -> str:
-    """What stands for the value in the help."""
+    """Return the placeholder of the value in the help."""
     if "path" in field.metadata:
         return METAVARS[field.metadata["path"]]
     return field.metadata["form"].split()[0] if "form" in field.metadata else "N"
 
 
 def _flag_words(field: Field) -> str:
-    """The flag as it is written, with what stands for its value."""
+    """Return the flag with the placeholder of its value."""
     flag = field.metadata["flag"]
-    return (
-        flag
-        if isinstance(field.default, bool)
-        else f"{flag} {'VALUE' if 'choices' in field.metadata else _metavar(field)}"
-    )
+    if isinstance(field.default, bool):
+        return flag
+    return f"{flag} {'VALUE' if 'choices' in field.metadata else _metavar(field)}"
 
 
 def _tooltip(name: str) -> str:
@@ -177,7 +158,7 @@ def _tooltip(name: str) -> str:
 
 
 def _flags(options: argparse.Namespace) -> list[tuple[str, str, object]]:
-    """The settings that flags give: (flag, name, value)."""
+    """Return the settings given by flags: (flag, name, value)."""
     given = {name: value for name, value in vars(options).items() if name in known_settings() and value != ""}
     return [
         (field.metadata["flag"], name, absolute_path(given[name]) if "path" in field.metadata else given[name])
@@ -187,7 +168,7 @@ def _flags(options: argparse.Namespace) -> list[tuple[str, str, object]]:
 
 
 def _assignment(text: str, command: str) -> tuple[str, str, object]:
-    """What follows a --set: (the words, name, value). Raises Problem."""
+    """Parse the argument of --set: (the words, name, value). Raises Problem."""
     name, equals, value = text.partition("=")
     name = name.strip()
     field = find_setting(name)

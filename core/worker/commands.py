@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a command of `python -m core` is added. Standard library only."""
+"""Definition of the commands of `python -m core`. Standard library only."""
 
 from __future__ import annotations
 
@@ -12,19 +12,10 @@ from pathlib import Path
 def add_command(
     commands, name: str, carry_out: Callable[[argparse.Namespace], int], help: str, *paths: str
 ) -> argparse.ArgumentParser:
-    """Adds `name PATH ...` to subparsers.
+    """Add `name PATH ...` to subparsers and return its parser.
 
-    Parameters
-    ----------
-    commands : the subparsers
-    name : of the command
-    carry_out : takes the options, paths in small letters among them, and gives the exit code
-    help : of the command
-    paths : in capitals, as the help shows them
-
-    Returns
-    -------
-    The parser, for what else the command has.
+    `paths` are written in capitals, as in the help; `carry_out` gets them as options in small letters, and returns the
+    exit code.
     """
     parser = commands.add_parser(name, help=help)
     for path in paths:

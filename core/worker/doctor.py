@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m core doctor: what is installed, what is missing or damaged, which device there is, and what to do."""
+"""python -m core doctor: packages and files that are missing or damaged, the device, and remedies."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from . import environment
 
 @dataclass(frozen=True)
 class Findings:
-    """What the doctor has to say: `lines` of what there is, `problems` and `remedies`, whole sentences; none where the
-    chain can run."""
+    """Lines about the installation; problems and remedies as sentences, none if the chain can run."""
 
     lines: tuple[str, ...]
     problems: tuple[str, ...]
@@ -24,19 +23,17 @@ class Findings:
 
     @property
     def text(self) -> str:
-        wrong = [
-            "",
-            "What is wrong:",
-            *(f"  {problem}" for problem in self.problems),
-            "What to do:",
-            *(f"  {remedy}" for remedy in self.remedies),
-        ]
-        return "\n".join((*self.lines, *(wrong if self.problems else ["Nothing is missing."])))
+        if not self.problems:
+            return "\n".join((*self.lines, "Nothing is missing."))
+        problems, remedies = (tuple(f"  {each}" for each in group) for group in (self.problems, self.remedies))
+        return "\n".join((*self.lines, "", "What is wrong:", *problems, "What to do:", *remedies))
 
 
 def examine(root: Path, python: Path, importing: bool = True) -> Findings:
-    """The findings about `python` and the code under `root`. Raises Problem for a Python that cannot be run.
-    Without `importing` a broken package may go unseen, and it takes a second in place of ten."""
+    """Examine `python` and the code under `root`. Raises Problem if the Python cannot be run.
+
+    Without `importing` it takes one second instead of ten, and broken packages go unnoticed.
+    """
     requirements = root / "requirements"
     probe = environment.survey(python, requirements, importing)
     lines = [
@@ -46,10 +43,8 @@ def examine(root: Path, python: Path, importing: bool = True) -> Findings:
     ]
     for name, version in environment.required(requirements).items():
         has = probe["versions"][name]
-        lines.append(
-            f"  {name:32} {has or 'missing':14}"
-            + ("" if has and has.partition("+")[0] == version else f" {version} is needed")
-        )
+        fits = has and has.partition("+")[0] == version
+        lines.append(f"  {name:32} {has or 'missing':14}" + ("" if fits else f" {version} is needed"))
     of_files = shipped_files.find_faults(root / "core")
     count = len(shipped_files.read_manifest()["core"])
     lines.append(f"own files     {count - len(of_files)} of {count} whole")
@@ -67,7 +62,7 @@ def examine(root: Path, python: Path, importing: bool = True) -> Findings:
 
 
 def _described(path: Path) -> str:
-    """Size, and what its card says of the licence."""
+    """Return a network's size, and the licence on its card."""
     try:
         licence = json.loads(path.with_suffix(".json").read_text(encoding="utf-8")).get("licence", "licence not stated")
     except (OSError, ValueError, AttributeError):

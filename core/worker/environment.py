@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The worker's own Python environment: what it must have, what it has, and taking it away. installation.py makes it.
+"""The worker's own Python environment: its requirements, its examination and removal; installation.py makes it.
 
-Ground floor: standard library only. Nothing is installed into Blender's Python.
+Standard library only. Nothing is installed into Blender's Python.
 """
 
 from __future__ import annotations
@@ -21,63 +21,61 @@ from ..capture.messages import Problem
 from .background import BackgroundTask
 
 PYTHONS = ((3, 11), (3, 12), (3, 13))
-"""Versions of Python for which every direct requirement has a wheel; locks.py has those that an environment is made
-for."""
+"""Versions of Python for which every direct requirement has a wheel; locks.py has those we make environments for."""
 MODULES = {
     "opencv-contrib-python-headless": "cv2",
     "openimageio": "OpenImageIO",
     "scikit-image": "skimage",
     "pillow-heif": "pillow_heif",
 }
-"""Modules of the packages that are called otherwise."""
+"""Package -> its module, where the names differ."""
 COMPUTE_FILE = "wildcap_compute.txt"
-"""Says in an environment for what, from where and by which lock it was made: another choice makes it anew, and so does
-one of an older WildCap. It is the first file in the folder, and says that the others are ours; empty while they are not
-complete."""
+"""Marks a folder as our environment: the first file in it, empty until the environment is complete. It holds device,
+source and lock; another choice makes the environment anew."""
 
 SURVEY_S = 300
-"""How long a Python may take to load every package once: on a cold disk, behind a virus scanner."""
+"""Longest time to import every package once: on a cold disk, behind a virus scanner."""
 
 
 def python_of(folder: Path) -> Path:
-    """Where an environment's Python is."""
+    """Return the path of an environment's Python."""
     return Path(folder) / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 
 
 def default_folder() -> Path:
-    """Where an environment goes: a short path, in no folder that a cloud or a roaming profile copies."""
+    """Return the default place: a short path, outside of folders that a cloud or a roaming profile copies."""
     return Path.home() / ".wildcap" / "solver"
 
 
 def required(requirements: Path) -> dict[str, str]:
-    """Package -> pinned version, of worker.txt in the folder `requirements`."""
-    lines = [
-        line.partition("#")[0].strip()
-        for line in (requirements / "worker.txt").read_text(encoding="utf-8").splitlines()
-    ]
+    """Return package -> pinned version, of worker.txt in the folder `requirements`."""
+    text = (requirements / "worker.txt").read_text(encoding="utf-8")
+    lines = [line.partition("#")[0].strip() for line in text.splitlines()]
     return dict(line.split("==") for line in lines if line)
 
 
 def verify(python: Path, requirements: Path, importing: bool = False, task: BackgroundTask | None = None) -> list[str]:
-    """What keeps `python` from running the worker, one sentence each; [] when nothing does.
-
-    With `importing` every module is imported as well (some ten seconds), which finds broken installations; a cancel of
-    `task` ends that.
-    """
+    """Return what keeps `python` from running the worker, one sentence each; see `survey`."""
     return judge(survey(python, requirements, importing, task), requirements)
 
 
 def survey(python: Path, requirements: Path, importing: bool = False, task: BackgroundTask | None = None) -> dict:
-    """What a Python has: {"python": [major, minor], "versions": {package: version or None}, "opencv": [packages],
-    "errors": {module: text}, "device": "cpu", "cuda" or "mps", "reason": why that one}. The device is proven by a
-    pass of the network (importing), else nothing is known of it: ''. Raises Problem when it cannot be run, and, where
-    `task` is cancelled, CancelledError."""
+    """Examine a Python.
+
+    Returns {"python": [major, minor], "versions": {package: version or None}, "opencv": [packages], "errors": {module:
+    text}, "device": "cpu", "cuda", "mps" or "", "reason"}. With `importing` (some ten seconds) every module is
+    imported, and the device proven by a pass of the network. Raises Problem if the Python cannot be run, and
+    CancelledError if `task` is cancelled.
+    """
     modules = [MODULES.get(name, name) for name in required(requirements)] if importing else []
     root = str(Path(requirements).parent) if importing else ""
     code = _SURVEY % {"names": list(required(requirements)), "modules": modules, "root": root}
-    printed = answer(python, code, SURVEY_S) if task is None else _answer_in(task, python, code)
+    task = task or BackgroundTask("survey", lambda task: None)
+    lines: list[str] = []
+    with contextlib.suppress(OSError):
+        task.run([python, "-I", "-c", code], lines.append, SURVEY_S)
     try:
-        return json.loads(printed.splitlines()[-1])
+        return json.loads([line for line in lines if line.startswith("{")][-1])  # libraries may print, too
     except (ValueError, IndexError):
         raise Problem(
             f"{python} is not a working Python.", "Choose another Python, or install the solver again."
@@ -85,14 +83,11 @@ def survey(python: Path, requirements: Path, importing: bool = False, task: Back
 
 
 def judge(survey: dict, requirements: Path) -> list[str]:
-    """What is wrong with a survey's findings, one sentence each."""
+    """Return the problems in a survey, one sentence each."""
     problems = []
     if tuple(survey["python"]) not in PYTHONS:
-        problems.append(
-            f"It is Python {survey['python'][0]}.{survey['python'][1]}; "
-            + " or ".join(f"{a}.{b}" for a, b in PYTHONS)
-            + " is needed."
-        )
+        has, *needed = ("{}.{}".format(*version) for version in (survey["python"], *PYTHONS))
+        problems.append(f"It is Python {has}; {' or '.join(needed)} is needed.")
     for name, version in required(requirements).items():
         has = survey["versions"][name]
         if has is None:
@@ -100,18 +95,16 @@ def judge(survey: dict, requirements: Path) -> list[str]:
         elif has.partition("+")[0] != version:
             problems.append(f"{name} is {has}, not {version}.")
     if len(survey["opencv"]) > 1:
-        problems.append(
-            f"More than one OpenCV is installed ({', '.join(survey['opencv'])}); remove all but "
-            "opencv-contrib-python-headless."
-        )
+        packages = ", ".join(survey["opencv"])
+        problems.append(f"More than one OpenCV is installed ({packages}); keep only opencv-contrib-python-headless.")
     return problems + [f"{module} does not load: {text}." for module, text in survey["errors"].items()]
 
 
 def remove(folder: Path, check: Callable[[], None] = lambda: None) -> None:
-    """Deletes an environment, last of all the file that says that it is ours: ended in the middle, by `check` or
-    otherwise, it can be asked for again. Raises Problem for a folder that is none, or that cannot be deleted, and what
-    `check`, called before each file goes, raises."""
-    folder = Path(folder)
+    """Delete an environment, its mark last: interrupted, it can be deleted again.
+
+    `check` is called before each file and may raise. Raises Problem if it is not ours or cannot be deleted.
+    """
     check_removable(folder)
     if not folder.exists():
         return
@@ -124,8 +117,7 @@ def remove(folder: Path, check: Callable[[], None] = lambda: None) -> None:
 
 
 def empty(folder: Path, keep: str, check: Callable[[], None] = lambda: None) -> None:
-    """Deletes all that is in a folder but the file `keep`; what links lead to stays. Raises OSError, and what `check`,
-    called before each file goes, raises."""
+    """Delete the contents of a folder except the file `keep`, without following links. Raises OSError."""
     for place, folders, files in os.walk(folder, topdown=False):
         for path in (Path(place, name) for name in (*files, *folders)):
             check()
@@ -136,8 +128,8 @@ def empty(folder: Path, keep: str, check: Callable[[], None] = lambda: None) -> 
 
 
 def check_removable(folder: Path) -> None:
-    """Raises Problem for a folder that is no environment of ours."""
-    if Path(folder).exists() and not (Path(folder) / COMPUTE_FILE).is_file():
+    """Raise Problem for a folder that is not our environment."""
+    if folder.exists() and not (folder / COMPUTE_FILE).is_file():
         raise Problem(
             f"{folder} is no environment that WildCap made, so it is not deleted.",
             "Choose the folder that the solver was installed to.",
@@ -145,7 +137,7 @@ def check_removable(folder: Path) -> None:
 
 
 def removal(folder: Path) -> BackgroundTask:
-    """`remove` in the background: an environment has tens of thousands of files."""
+    """Return a task that removes an environment, which has tens of thousands of files."""
 
     def work(task: BackgroundTask) -> None:
         task.say(0, 1, "deleting the solver")
@@ -157,23 +149,16 @@ def removal(folder: Path) -> BackgroundTask:
 
 @contextlib.contextmanager
 def alone_in(folder: Path, task: BackgroundTask) -> Iterator[None]:
-    """Keeps every other installation and removal out of an environment's folder, of whatever Blender: by a lease
-    beside it, for what is in it comes and goes. One of this process was cancelled and has not quite ended: it is waited
-    for. Raises Problem naming who else works there, and CancelledError."""
+    """Hold the lease of an environment's folder, a file beside it, against other installations and removals.
+
+    A holder in this process was cancelled and is waited for. Raises Problem naming any other, and CancelledError.
+    """
     path, here = folder.with_name(f"{folder.name}.wildcap-install.lock"), processes.identify_process().items()
     while here <= (lease.holder(path) or {}).items():
         task.say(0, 1, "waiting for what was cancelled to end")
         time.sleep(lease.LOOK_S)
     with lease.hold_file(path, lambda text: task.say(0, 1, text), "installation", lambda: task.cancelled):
         yield
-
-
-def _answer_in(task: BackgroundTask, python: Path, code: str) -> str:
-    """As `answer`, until the task is cancelled; of what is printed, and said beside it, the lines that are JSON."""
-    lines: list[str] = []
-    with contextlib.suppress(OSError):
-        task.run([python, "-I", "-c", code], lines.append, SURVEY_S)
-    return "".join(line for line in lines if line.startswith("{"))
 
 
 _SURVEY = """
@@ -205,16 +190,15 @@ print(json.dumps({"python": sys.version_info[:2], "versions": versions, "opencv"
 """
 
 
-def answer(python: str | Path, code: str, timeout_s: float = 20) -> str:
-    """What `python` prints for `code`; '' when it cannot be run. Isolated: a json.py in the folder that Blender was
-    started in is nobody's module."""
+def answer(python: str | Path, code: str) -> str:
+    """Return what `python` prints for `code`, '' if it cannot be run; isolated from the working directory."""
     flags = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {}
     try:
         result = subprocess.run(
             [str(python), "-I", "-c", code],
             capture_output=True,
             text=True,
-            timeout=timeout_s,
+            timeout=20,
             stdin=subprocess.DEVNULL,
             env=switchlight_api.environment_without_key(),
             **flags,

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an installation will download, from where, and how much disk it takes, before anything is installed.
+"""Download, hosts and disk space of an installation, before anything is installed.
 
-Ground floor: standard library only. pip's dry run finds out whether the index has it all: it alone knows which index
-this machine looks in, and which build of PyTorch a studio's has. How large the packages are, the locks say.
+pip's dry run tells whether the index has everything: only pip knows which index this machine uses, and which build of
+PyTorch it has. The locks tell how large the packages are. Standard library only.
 """
 
 from __future__ import annotations
@@ -24,8 +24,7 @@ RETRIES = ("--retries", "1")
 
 @dataclass(frozen=True)
 class InstallationPlan:
-    """The packages by name and version, the hosts they come from ('this disk' for files), bytes to download and bytes
-    once unpacked."""
+    """Package -> version, the hosts ("this disk" for files), and bytes to download and on disk."""
 
     packages: dict[str, str]
     hosts: tuple[str, ...]
@@ -34,7 +33,7 @@ class InstallationPlan:
 
     @property
     def needed(self) -> int:
-        """Free bytes to have: while it installs, downloads and packages are both there."""
+        """Free bytes needed: downloads and packages exist at the same time."""
         return self.download + self.disk
 
 
@@ -47,22 +46,10 @@ def plan_installation(
     say: Callable[[float, float, str], None] = lambda *_: None,
     wheels: Path | None = None,
 ) -> InstallationPlan:
-    """What an installation would bring (see installation.py).
+    """Plan an installation from the Python `base`, for a device ("cpu", "cuda", "apple") and one of pip_steps.SOURCES.
 
-    Parameters
-    ----------
-    requirements : the folder of requirements and locks
-    base : the Python to make it from
-    compute : 'cpu', 'cuda' or 'apple'
-    source : one of pip_steps.SOURCES
-    run : runs a command; its exit code and last error
-    say : takes how far it is: done, of how much, doing what
-    wheels : the folder of 'folder'
-
-    Raises
-    ------
-    Problem
-        When there is no solver for this machine, or the index cannot be reached or lacks a package.
+    `run` runs a command and returns its exit code and last error. Raises Problem if there is no solver for this
+    machine, or if the index cannot be reached or lacks a package.
     """
     lock = pip_steps.lock_of(base, requirements)
     wheels = Path(wheels) if source == "folder" else None
@@ -72,17 +59,15 @@ def plan_installation(
         pip = [python, *pip_steps.INSTALL, *RETRIES]
         say(1, 3, "preparing to ask the package index")
         if wheels is None:
-            # one that reads descriptions without downloading packages; an old one works, slowly
+            # a pip that reads metadata without downloading packages; an old one works, slowly
             run([*pip, "--quiet", *pip_steps.PINNED, "--require-hashes", "-r", requirements / "locks" / "pip.txt"])
         packages, report = {}, Path(folder) / "report.json"
 
         def ask(words: tuple[str, ...]) -> tuple[int, str]:
             code, error = run([*pip, "--dry-run", "--quiet", "--ignore-installed", "--report", report, *words])
             for entry in json.loads(report.read_text(encoding="utf-8"))["install"] if not code else ():
-                packages[locks.normal(entry["metadata"]["name"])] = (
-                    entry["metadata"]["version"],
-                    entry["download_info"]["url"],
-                )
+                about = entry["metadata"]
+                packages[locks.normal(about["name"])] = about["version"], entry["download_info"]["url"]
             return code, error
 
         todo = pip_steps.plan_steps(requirements, lock, compute, source, Path(folder), wheels)
@@ -91,12 +76,11 @@ def plan_installation(
         )
         if code:
             raise Problem(
-                f"The package index did not answer as expected "
-                f"({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",
+                f"The package index did not answer as expected ({pip_steps.shorten(error)}).",
                 "Check the network connection, and try again.",
             )
-    known = locks.known_sizes(requirements, lock.name)
-    sizes = [known[f"{name}=={version}"] for name, (version, _) in packages.items()]
+    known_sizes = locks.known_sizes(requirements, lock.name)
+    sizes = [known_sizes[f"{name}=={version}"] for name, (version, _) in packages.items()]
     hosts = sorted({urllib.parse.urlsplit(url).hostname or "this disk" for _, url in packages.values()})
     return InstallationPlan(
         {name: version for name, (version, _) in packages.items()},
@@ -107,7 +91,7 @@ def plan_installation(
 
 
 def check_space(plan: InstallationPlan, folder: Path) -> int:
-    """Bytes free on the disk of a folder that need not be there yet. Raises Problem when the plan does not fit."""
+    """Return the free bytes on the disk of a folder, which need not exist. Raises Problem if the plan does not fit."""
     free = free_space(folder)
     if free < plan.needed:
         raise Problem(
@@ -119,12 +103,12 @@ def check_space(plan: InstallationPlan, folder: Path) -> int:
 
 
 def free_space(folder: Path) -> int:
-    """Bytes free on the disk of a folder that need not be there yet."""
+    """Return the free bytes on the disk of a folder, which need not exist."""
     return shutil.disk_usage(next(path for path in (folder, *folder.absolute().parents) if path.is_dir())).free
 
 
 def folder_size(folder: Path) -> int:
-    """Bytes of all files in a folder; links are not followed."""
+    """Return the bytes of all files in a folder, without following links."""
     return sum(path.lstat().st_size for path in Path(folder).rglob("*") if not path.is_dir())
 
 

@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Making the worker's own Python environment: from which Python, with which build of PyTorch, from where, and in the
-background.
+"""Installation of the worker's own Python environment in the background.
 
-Ground floor: standard library only. Nothing is installed into Blender's Python.
+Standard library only. Nothing is installed into Blender's Python.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import os
 import shutil
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..capture.files import storage_problem
@@ -21,56 +20,39 @@ from ..capture.messages import Problem
 from . import bare_environment, locks
 from .background import BackgroundTask
 from .environment import COMPUTE_FILE, alone_in, answer, python_of, required, verify
-from .pip_steps import INSTALL, carry_out, compute_of, lock_of, plan_steps
+from .pip_steps import INSTALL, carry_out, compute_of, lock_of, plan_steps, shorten
 
 
 @dataclass(frozen=True)
 class PackageSource:
-    """Which packages come, and from where: compute is 'auto', 'cpu', 'cuda' or 'apple', what PyTorch is built for;
-    source is one of pip_steps.SOURCES, and wheels the folder of 'folder'."""
+    """Build of PyTorch, and where packages come from."""
 
-    compute: str = "auto"
-    source: str = "pytorch"
-    wheels: Path | None = None
+    compute: str = "auto"  # or "cpu", "cuda", "apple"
+    source: str = "pytorch"  # one of pip_steps.SOURCES
+    wheels: Path | None = None  # for the source "folder"
 
 
 def installation(
     folder: Path, requirements: Path, log: Path, base: Path | None, chosen: PackageSource, packages: int = 0
 ) -> BackgroundTask:
-    """Makes an environment in the background. One in the same folder as a broken or cancelled one continues that; where
-    that does not work, it is made anew. What a cancel leaves stays, and what was downloaded is in pip's cache.
+    """Return a task that makes an environment from the Python `base`, or from one that it finds.
 
-    Parameters
-    ----------
-    folder : new, empty, or one that an earlier installation began
-    requirements : the folder of requirements and locks
-    log : takes what pip says
-    base : the Python to make it from, None: found
-    chosen : which packages, and from where
-    packages : how many will come, 0: guessed
-
-    Returns
-    -------
-    The task, not started; its progress counts packages.
-
-    Raises
-    ------
-    Problem : when the folder is somebody else's
+    It continues what an earlier installation left in the folder, and starts anew where that does not work. Its progress
+    counts packages, of which `packages` will come (0: guessed). Raises Problem for a folder with other files.
     """
     folder, compute = Path(folder), compute_of(chosen.compute)
     if folder.is_dir() and any(folder.iterdir()) and not (folder / COMPUTE_FILE).is_file():
         raise Problem(f"{folder} holds other files.", "Choose an empty folder.")
     expected = packages or 3 * len(required(requirements))  # each brings about two more
-    chosen = PackageSource(compute, chosen.source, Path(chosen.wheels) if chosen.source == "folder" else None)
+    chosen = replace(chosen, compute=compute, wheels=Path(chosen.wheels) if chosen.source == "folder" else None)
 
     def work(task: BackgroundTask) -> None:
         try:
             for place in (log.parent, folder.parent):
                 place.mkdir(parents=True, exist_ok=True)
             with alone_in(folder, task), open(log, "w", encoding="utf-8") as file:
-                _Installing(
-                    task, folder, requirements, base or base_python(), chosen, _listener(task, file, expected), log
-                ).run()
+                hear = _listener(task, file, expected)
+                _install(task, hear, folder, requirements, base or base_python(), chosen, log)
         except OSError as error:
             raise storage_problem(error, folder) from error
 
@@ -78,8 +60,7 @@ def installation(
 
 
 def find_python() -> Path | None:
-    """A Python on this machine that the environment can be made from, Blender's own before all others; None when there
-    is none."""
+    """Return a Python that an environment can be made from, preferably Blender's own, or None."""
     own = "{}.{}".format(*sys.version_info)
     names = [f"python{major}.{minor}" for major, minor in locks.PYTHONS] + ["python3", "python"]
     candidates = [
@@ -102,64 +83,56 @@ def find_python() -> Path | None:
 
 
 def base_python() -> Path:
-    """As `find_python`. Raises Problem when there is none: what is wrong with Blender's own."""
+    """Return a Python as `find_python` does. Raises Problem with what is wrong with Blender's own if there is none."""
     python = find_python()
     if python is None:
         locks.lock_name(answer(sys.executable, locks.DESCRIBE))
     return python
 
 
-@dataclass(frozen=True)
-class _Installing:
-    """What an installation works with; `hear` takes each line that pip says."""
+def _install(
+    task: BackgroundTask,
+    hear: Callable[[str], None],
+    folder: Path,
+    requirements: Path,
+    base: Path,
+    chosen: PackageSource,
+    log: Path,
+) -> None:
+    """Make or continue an environment; `hear` takes each line of pip's output. Raises Problem."""
+    lock = lock_of(base, requirements)
+    locks.check_path(lock, folder, limited=os.name == "nt")
+    made_for = " ".join((chosen.compute, chosen.source, lock.name))
 
-    task: BackgroundTask
-    folder: Path
-    requirements: Path
-    base: Path
-    chosen: PackageSource
-    hear: Callable[[str], None]
-    log: Path
+    def run(command) -> tuple[int, str]:
+        return task.run(command, hear)
 
-    def run(self) -> None:
-        lock = lock_of(self.base, self.requirements)
-        locks.check_path(lock, self.folder, limited=os.name == "nt")
-        made_for = " ".join((self.chosen.compute, self.chosen.source, lock.name))
-        continued = _begun(self.folder, made_for)
-        problems = self._bring(lock, made_for, anew=not continued)
-        # pip believes what an environment says of itself, though files of it may be gone or cut
-        if problems and continued:
-            problems = self._bring(lock, made_for, anew=True)
-        if problems:
-            raise Problem(problems[0], f"Install again; the log is {self.log}.")
-
-    def _bring(self, lock: locks.Lock, made_for: str, anew: bool) -> list[str]:
-        """One try of all steps; what is wrong then."""
-        task, folder, requirements, chosen = self.task, self.folder, self.requirements, self.chosen
+    def bring(anew: bool) -> list[str]:
+        """Run all steps once, and return what is wrong afterwards."""
         if anew:
             task.say(0, 100, "making the solver's folder")
             folder.mkdir(parents=True, exist_ok=True)
             (folder / COMPUTE_FILE).write_text("", encoding="utf-8")
-            bare_environment.make(
-                folder,
-                self.base,
-                requirements,
-                lambda command: task.run(command, self.hear),
-                chosen.wheels,
-                keep=COMPUTE_FILE,
-            )
+            bare_environment.make(folder, base, requirements, run, chosen.wheels, keep=COMPUTE_FILE)
             (folder / COMPUTE_FILE).write_text(made_for, encoding="utf-8")
         pip = [python_of(folder), *INSTALL, "--progress-bar", "off"]
-        todo = plan_steps(requirements, lock, chosen.compute, chosen.source, folder, chosen.wheels)
-        code, error = carry_out(todo, lambda words: task.run([*pip, *words], self.hear))
+        steps = plan_steps(requirements, lock, chosen.compute, chosen.source, folder, chosen.wheels)
+        code, error = carry_out(steps, lambda words: run([*pip, *words]))
         if code:
-            raise _failure(error, folder, self.log)
+            raise _failure(error, folder, log)
         task.say(99, 100, "trying every package")
         return verify(python_of(folder), requirements, importing=True, task=task)
 
+    continued = _begun(folder, made_for)
+    problems = bring(anew=not continued)
+    if problems and continued:  # pip trusts an environment's metadata although files may be missing or damaged
+        problems = bring(anew=True)
+    if problems:
+        raise Problem(problems[0], f"Install again; the log is {log}.")
+
 
 def _begun(folder: Path, made_for: str) -> bool:
-    """Whether an earlier installation of the same left an environment whose pip works."""
+    """Return whether an earlier installation of the same kind left an environment with a working pip."""
     mark = folder / COMPUTE_FILE
     return (
         mark.is_file()
@@ -169,16 +142,16 @@ def _begun(folder: Path, made_for: str) -> bool:
 
 
 def _listener(task: BackgroundTask, log, expected: int):
-    """What hears pip's lines: into the log, and package by package into the task's progress."""
-    seen = 0
+    """Return a function that writes pip's lines to the log, and counts packages in the task's progress."""
+    count = 0
 
     def hear(line: str) -> None:
-        nonlocal seen
+        nonlocal count
         log.write(line)
         log.flush()
         if line.startswith(("Collecting", "  Downloading", "Installing collected")):
-            seen += line.startswith("Collecting")
-            task.say(min(seen, expected), expected, line.strip().split(" (from")[0][:80])
+            count += line.startswith("Collecting")
+            task.say(min(count, expected), expected, line.strip().split(" (from")[0][:80])
 
     return hear
 
@@ -187,7 +160,7 @@ def _failure(last_error: str, folder: Path, log: Path) -> Problem:
     text = last_error.lower()
     if "do not match the hashes" in text:
         return Problem(
-            "A package is not the file that WildCap was made with: its hash is another.",
+            "A package is not the file that WildCap was made with: its hash differs.",
             f"Install again, or ask who runs your package index; the log is {log}.",
         )
     if "no space left" in text or "disk" in text:
@@ -199,5 +172,4 @@ def _failure(last_error: str, folder: Path, log: Path) -> Problem:
             "A package could not be downloaded.",
             f"Check the network connection and install again; it continues. The log is {log}.",
         )
-    said = last_error.removeprefix("ERROR: ").rstrip(".") or "no message"
-    return Problem(f"The installation stopped ({said}).", f"Install again; the log is {log}.")
+    return Problem(f"The installation stopped ({shorten(last_error)}).", f"Install again; the log is {log}.")

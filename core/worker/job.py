@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The job file: all that a worker is told, and the record of what was asked. The same job gives the same maps.
+"""The job file: everything a worker is told, and its record. The same job gives the same maps.
 
-Ground floor: standard library only.
+Standard library only.
 """
 
 from __future__ import annotations
@@ -23,15 +23,14 @@ from ..settings.settings import Settings, from_json, preset
 
 @dataclass(frozen=True)
 class JobRequest:
-    """`source` is a video or a folder of photographs ('': the one the capture has); `chain` are the stages to run, in
-    order; `force` says that they run even where they are fresh."""
+    """A parsed job file."""
 
     capture: Capture
-    source: str
+    source: str  # a video or a folder of photographs; '' for the capture's own
     chain: tuple[stages.Stage, ...]
-    force: bool
+    force: bool  # run fresh stages as well
     settings: Settings
-    tool: stages.Stage | None = None  # what runs in the chain's place
+    tool: stages.Stage | None = None  # runs instead of the chain
 
 
 def write_job(
@@ -44,28 +43,14 @@ def write_job(
     quality: str = "standard",
     tool: str = "",
 ) -> Path:
-    """Writes the capture's job.json.
+    """Write the capture's job.json and return its path.
 
-    Parameters
-    ----------
-    capture : that is worked on
-    source : a video or a folder of photographs, '': the one the capture has
-    first : name of the stage to begin with, which is forced with those after it; None: the first one, skipping what is
-        fresh
-    last : name of the stage that ends the job, None: the last one
-    settings : {stage: {name: value}}, seed and device, over the preset
-    quality : the preset
-    tool : one of stages.TOOLS, to run in place of the chain, or ''
+    Without a `source`, a video or a folder of photographs, the capture's own is used. The job runs the stages `first`
+    to `last`, forced; without `first` it begins with the first and skips fresh ones. `settings` ({stage: {name: value},
+    seed, device}) lie over the preset `quality`. `tool`, one of stages.TOOLS, runs instead of the chain.
 
-    Returns
-    -------
-    The path of job.json.
-
-    Raises
-    ------
-    Problem
-        For an unknown name or value, when the folder cannot be written, for file names that are no text, and while
-        another worker is at the capture: job.json is the record of what that one was asked.
+    Raises Problem for an invalid name or value, if the folder cannot be written, and while another worker is at the
+    capture, whose record job.json is.
     """
     chosen = convert_settings(settings or {}, lambda path: write_portable(path, capture.root))
     job = {
@@ -90,16 +75,17 @@ def write_job(
 def wait_until_free(
     capture: Capture, tell: Callable[[str], None], cancelled: Callable[[], bool] = lambda: False
 ) -> None:
-    """Sees to it that nobody holds the capture before a job is written there: a lease that a machine which has gone
-    left behind is taken over when its term is out. Raises Problem where somebody works there, and CancelledError;
-    `tell` hears of the wait."""
+    """Wait for the lease that a dead machine left on a capture to run out, before a job is written there.
+
+    `tell` takes a line about the wait. Raises Problem if somebody works there, and CancelledError.
+    """
     if capture.json.is_file() and capture.lock.exists():
         with capture.locked(tell, cancelled):
             pass
 
 
 def read_job(path: Path) -> JobRequest:
-    """The job of a file. Raises Problem when it is damaged or asks for what there is not."""
+    """Read a job file. Raises Problem if it is damaged or invalid."""
     try:
         return _job(read_json(path), Path(path).parent)
     except Problem as problem:
@@ -112,14 +98,12 @@ def read_job(path: Path) -> JobRequest:
 
 
 def last_settings(capture: Capture) -> Settings:
-    """Those of the capture's last job, by which its stages are judged; the defaults where there was none. Raises
-    Problem when its file is damaged."""
+    """Return the settings of the last job, by which stages are judged, or the defaults. Raises Problem."""
     return read_job(capture.job).settings if capture.job.is_file() else Settings()
 
 
 def _check_names(root: Path, source: str | Path) -> None:
-    """Raises Problem for a name that is no text, in the path of the capture or of its source, or of a photograph: no
-    record could hold it."""
+    """Raise Problem for a name that is not UTF-8, of the capture, its source or a photograph: JSON cannot hold it."""
     try:
         inside = os.listdir(source) if str(source) and os.path.isdir(source) else []
     except OSError as error:
@@ -133,20 +117,20 @@ def _check_names(root: Path, source: str | Path) -> None:
         except UnicodeEncodeError:
             raise Problem(
                 f"The name {name.encode(errors='backslashreplace').decode()!r} is not in UTF-8.",
-                "Rename the file or folder: it may come from an old disk or archive.",
+                "Rename the file or folder; it may come from an old disk or archive.",
             ) from None
 
 
 def _job(request: dict, folder: Path) -> JobRequest:
-    """`folder` is where the job file lies; its paths are relative to that where they can be."""
+    """Parse a job whose file lies in `folder`, from which its relative paths begin. Raises Problem."""
     first, last = (
-        stages.NAMES.index(stages.by_name(name).name) if name else default
-        for name, default in ((request.get("from"), 0), (request.get("until"), len(stages.NAMES) - 1))
+        stages.NAMES.index(stages.by_name(request.get(key) or default).name)
+        for key, default in (("from", stages.NAMES[0]), ("until", stages.NAMES[-1]))
     )
     if first > last:
         raise Problem(
             f"The stage {stages.NAMES[first]} comes after {stages.NAMES[last]}.",
-            "Name the first stage to run before the last one.",
+            "Name a first stage that comes before the last one.",
         )
     chosen = convert_settings(request.get("settings") or {}, lambda path: str(read_portable(path, folder)))
     settings = from_json(chosen, preset(request.get("quality") or "standard"))

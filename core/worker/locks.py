@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which packages go to which machine: requirements/locks/PLATFORM-PYTHON.txt names every one, with the hashes of its
-wheels.
+"""requirements/locks/PLATFORM-PYTHON.txt: every package for a machine, with the hashes of its wheels.
 
-`python -m research.benchmarks.locks` writes them. Beside a lock may lie PLATFORM-PYTHON-cpu.txt or -cuda.txt: PyTorch's
-build for that device where the lock's own is another, or what that build needs besides. Standard library only."""
+`python -m research.benchmarks.locks` writes them. PLATFORM-PYTHON-cpu.txt or -cuda.txt beside a lock holds PyTorch's
+build for that device if the lock's own differs, or what that build needs in addition. Standard library only.
+"""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from pathlib import Path
 from ..capture.messages import Problem
 
 PYTHONS = ((3, 11), (3, 13))
-"""Versions of Python that there are locks for: those of Blender 4.2 to 5.0, and of 5.1 and newer."""
+"""Versions of Python with locks: those of Blender 4.2 to 5.0, and of 5.1 and newer."""
 PLATFORMS = {
     "win_amd64": ("win_amd64",),
     "macosx_arm64": tuple(f"macosx_{major}_0_{kind}" for major in (14, 13, 12, 11) for kind in ("arm64", "universal2"))
     + ("macosx_10_9_universal2",),
     "manylinux_x86_64": tuple(f"manylinux_2_{minor}_x86_64" for minor in range(28, 4, -1)) + ("manylinux2014_x86_64",),
 }
-"""Platform of a lock -> tags of the wheels that it takes, the newest first."""
+"""Platform of a lock -> tags of its wheels, the newest first."""
 MACOS, GLIBC = (14, 0), (2, 28)
-"""The oldest that the wheels are made for."""
+"""Oldest versions that the wheels support."""
 LONGEST_PATH = 250
-"""Characters that no path of an installation exceeds; Windows without long paths switched on stops at 259."""
+"""Longest path of an installation in characters; Windows without long paths stops at 259."""
 ELSEWHERE = (
     "Click Use an Existing Python and choose one with the packages of requirements/worker.txt; masks, "
     "materials and renders work without the solver."
@@ -39,19 +39,17 @@ print(json.dumps({"python": sys.version_info[:2], "system": sys.platform, "machi
                   "bits": 8 * struct.calcsize("P"), "macos": platform.mac_ver()[0], "libc": platform.libc_ver(),
                   "free_threaded": bool(sysconfig.get_config_var("Py_GIL_DISABLED"))}))
 """
-"""What a Python prints about itself for `lock_name`."""
+"""Code that prints a Python's description for `lock_name`."""
 
 
 @dataclass(frozen=True)
 class Lock:
-    """`lines`: package -> its requirement with version and hashes; `longest` is the longest path below an environment's
-    folder, in characters, while it is installed, 0 where the file does not say; `sizes`: PACKAGE==VERSION -> bytes to
-    download, and bytes on disk with the Python that pip compiles."""
+    """A parsed lock."""
 
     name: str
-    lines: dict[str, str]
-    longest: int = 0
-    sizes: dict[str, tuple[int, int]] = field(default_factory=dict)
+    lines: dict[str, str]  # package -> requirement with version and hashes
+    longest: int = 0  # characters of the longest path below an environment's folder, 0 if unknown
+    sizes: dict[str, tuple[int, int]] = field(default_factory=dict)  # PACKAGE==VERSION -> bytes to download, on disk
 
     @property
     def platform(self) -> str:
@@ -63,7 +61,7 @@ class Lock:
 
     @property
     def verified(self) -> bool:
-        """Whether every line has a hash."""
+        """True if every line has a hash."""
         return all("--hash=" in line for line in self.lines.values())
 
 
@@ -72,8 +70,7 @@ def names() -> list[str]:
 
 
 def lock_name(description: str) -> str:
-    """The name of the lock for the Python that printed `description` (see DESCRIBE). Raises Problem where there is
-    none, before anything is downloaded."""
+    """Return the name of the lock for the Python that printed `description` (see DESCRIBE). Raises Problem."""
     try:
         about = json.loads(description)
         python, system, machine = tuple(about["python"]), about["system"], about["machine"]
@@ -84,12 +81,12 @@ def lock_name(description: str) -> str:
         ) from None
     version = ".".join(map(str, python))
     if python not in PYTHONS or about["free_threaded"]:
+        versions = " and ".join(f"{major}.{minor}" for major, minor in PYTHONS)
         kind = f"{version} without its global lock" if about["free_threaded"] else version
         raise Problem(
-            f"This Python is {kind}; the solver's packages are made for "
-            f"{' and '.join(f'{a}.{b}' for a, b in PYTHONS)}.",
-            "Click Use an Existing Python and choose one of these versions, or take the Blender from "
-            "blender.org, which brings its own.",
+            f"This Python is {kind}; the solver's packages are made for {versions}.",
+            "Click Use an Existing Python and choose one of these versions, or use the Blender of blender.org, which "
+            "brings its own.",
         )
     if system == "darwin" and machine != "arm64":
         raise Problem(
@@ -101,8 +98,8 @@ def lock_name(description: str) -> str:
             f"The solver needs macOS {MACOS[0]} or newer; this is {about['macos']}.",
             f"Update macOS. Or {ELSEWHERE[0].lower()}{ELSEWHERE[1:]}",
         )
-    known = machine in ("arm64", "x86_64", "amd64") and about["bits"] == 64
-    if not known or (machine == "arm64" and system != "darwin"):
+    is_supported = machine in ("arm64", "x86_64", "amd64") and about["bits"] == 64
+    if not is_supported or (machine == "arm64" and system != "darwin"):
         raise Problem(
             f"There is no solver for this processor ({machine}, {about['bits']} bits): pycolmap is not made for it.",
             ELSEWHERE,
@@ -117,7 +114,7 @@ def lock_name(description: str) -> str:
 
 
 def read(requirements: Path, name: str) -> Lock:
-    """A lock of the folder `requirements`. Raises Problem when it has none of that name."""
+    """Read a lock of the folder `requirements`. Raises Problem if there is none of that name."""
     path = Path(requirements) / "locks" / f"{name}.txt"
     if not path.is_file():
         raise Problem(f"There is no lock for {name}.", f"Choose one of {', '.join(names())}.")
@@ -133,14 +130,13 @@ def read(requirements: Path, name: str) -> Lock:
 
 
 def beside(requirements: Path, name: str, compute: str) -> Path | None:
-    """The file of PyTorch's build for a device ('cpu', 'cuda') beside a lock; None where the lock's own build is the
-    one."""
+    """Return the file of PyTorch's build for a device beside a lock; None if the lock's own is right."""
     path = Path(requirements) / "locks" / f"{name}-{compute}.txt"
     return path if path.is_file() else None
 
 
 def known_sizes(requirements: Path, name: str) -> dict[str, tuple[int, int]]:
-    """Lock.sizes of a lock and of what lies beside it."""
+    """Return Lock.sizes of a lock and the files beside it."""
     sizes = dict(read(requirements, name).sizes)
     for compute in ("cpu", "cuda"):
         if beside(requirements, name, compute) is not None:
@@ -149,19 +145,17 @@ def known_sizes(requirements: Path, name: str) -> dict[str, tuple[int, int]]:
 
 
 def check_path(lock: Lock, folder: Path, limited: bool) -> None:
-    """Raises Problem where an installation to `folder` would have paths longer than LONGEST_PATH; `limited` says that
-    this system cuts them."""
+    """Raise Problem if an installation to `folder` would exceed LONGEST_PATH on a system that limits paths."""
     room = LONGEST_PATH - lock.longest - 1
     if limited and len(str(Path(folder).absolute())) > room:
         raise Problem(
-            f"The solver's folder {folder} has too long a path: with what comes into it, Windows cannot open "
-            "some files.",
+            f"The solver's folder {folder} has too long a path: Windows could not open some files in it.",
             f"Choose a folder whose path has at most {room} characters.",
         )
 
 
 def normal(name: str) -> str:
-    """A package's name as PEP 503 compares them."""
+    """Return a package's name as PEP 503 compares them."""
     return re.sub(r"[-_.]+", "-", name).lower()
 
 

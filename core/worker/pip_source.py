@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""pip itself, where Python brings none: its wheel, from a folder or from the package index that this machine's pip
-would use.
+"""pip itself, where Python brings none: its wheel from a folder, or from the index that pip would use here.
 
-Standard library only. This is the one page of an index that we read ourselves: without pip there is nobody else to do
-it, and a lock pins the file by its hash but names no address, for a studio's mirror has its own. The index is found as
-pip finds it (environment, then pip.conf), so that such a mirror serves here, too.
+This is the one page of an index that we read ourselves. A lock pins the file by its hash but has no address, so the
+index is found as pip finds it (environment, then pip.conf), and a studio's mirror serves as well. Standard library
+only.
 """
 
 from __future__ import annotations
 
 import configparser
+import contextlib
 import hashlib
 import os
 import re
@@ -28,8 +28,7 @@ TIMEOUT_S = 60  # of one request
 
 
 def fetch(requirements: Path, wheels: Path | None = None) -> bytes:
-    """The wheel of the pip that locks/pip.txt pins, from the folder `wheels` or downloaded. Raises Problem where it is
-    not there or not the one."""
+    """Return the wheel that locks/pip.txt pins, from the folder `wheels` or downloaded. Raises Problem."""
     line = locks.read(requirements, "pip").lines["pip"]
     version, digest = re.search(r"==(\S+)", line)[1], re.search(r"sha256:(\w+)", line)[1]
     name = f"pip-{version}-py3-none-any.whl"
@@ -44,46 +43,36 @@ def fetch(requirements: Path, wheels: Path | None = None) -> bytes:
         content = _download(name)
     if hashlib.sha256(content).hexdigest() != digest:
         raise Problem(
-            f"{name} is not the file that WildCap was made with: its hash is another.",
+            f"{name} is not the file that WildCap was made with: its hash differs.",
             "Try again; if that does not help, click Use an Existing Python.",
         )
     return content
 
 
 def setting(name: str) -> str:
-    """One of pip's settings, as 'index-url' or 'cert': from its environment variable, else from its files, the user's
-    before the machine's; '' if none. PIP_CONFIG_FILE as the null device means to pip that no file counts."""
-    said = os.environ.get(f"PIP_{name.upper().replace('-', '_')}", "")
-    files = [os.environ.get("PIP_CONFIG_FILE", "")]
-    if files == [os.devnull]:
-        pass
-    elif os.name == "nt":
-        files += [
-            f"{os.environ.get('APPDATA', '')}/pip/pip.ini",
-            f"{Path.home()}/pip/pip.ini",
-            f"{os.environ.get('PROGRAMDATA', '')}/pip/pip.ini",
-        ]
-    else:
-        home = Path.home()
-        own = os.environ.get("XDG_CONFIG_HOME") or f"{home}/.config"
-        apple = (
-            [f"{home}/Library/Application Support/pip/pip.conf", "/Library/Application Support/pip/pip.conf"]
-            if sys.platform == "darwin"
-            else []
-        )
-        files += [f"{own}/pip/pip.conf", f"{home}/.pip/pip.conf", *apple, "/etc/pip.conf"]
-    for file in files if not said else ():
+    """Return a setting of pip ("index-url", "cert") from its environment variable or its files, or ''."""
+    value = os.environ.get(f"PIP_{name.upper().replace('-', '_')}", "")
+    for file in _configuration_files() if not value else ():
         parser = configparser.RawConfigParser(strict=False)
-        try:
+        with contextlib.suppress(configparser.Error, UnicodeDecodeError):  # pip will name a damaged file when it runs
             parser.read(file, encoding="utf-8")
-        except (configparser.Error, UnicodeDecodeError):  # pip refuses such a file by name when it runs
-            continue
-        said = next(
-            (parser.get(section, name) for section in ("install", "global") if parser.has_option(section, name)), ""
-        )
-        if said:
-            break
-    return said.strip()
+        for section in ("install", "global"):
+            value = value or parser.get(section, name, fallback="")
+    return value.strip()
+
+
+def _configuration_files() -> list[str]:
+    """Return pip's files, the user's before the machine's; the null device as PIP_CONFIG_FILE excludes all others."""
+    home, named = Path.home(), os.environ.get("PIP_CONFIG_FILE", "")
+    if named == os.devnull:
+        return []
+    if os.name == "nt":
+        folders = [os.environ.get("APPDATA", ""), str(home), os.environ.get("PROGRAMDATA", "")]
+        return [named, *(f"{folder}/pip/pip.ini" for folder in folders)]
+    own = os.environ.get("XDG_CONFIG_HOME") or f"{home}/.config"
+    apple = [f"{home}/Library/Application Support", "/Library/Application Support"] if sys.platform == "darwin" else []
+    folders = [f"{own}/pip", f"{home}/.pip", *(f"{folder}/pip" for folder in apple), "/etc"]
+    return [named, *(f"{folder}/pip.conf" for folder in folders)]
 
 
 def _download(name: str) -> bytes:
@@ -105,7 +94,6 @@ def _download(name: str) -> bytes:
 
 def _get(url: str) -> bytes:
     cert = setting("cert")
-    with urllib.request.urlopen(
-        url, timeout=TIMEOUT_S, context=ssl.create_default_context(cafile=cert) if cert else None
-    ) as answer:
+    context = ssl.create_default_context(cafile=cert) if cert else None
+    with urllib.request.urlopen(url, timeout=TIMEOUT_S, context=context) as answer:
         return answer.read()

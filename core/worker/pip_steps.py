@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What pip is told to bring the solver to a machine: which lock, which build of PyTorch, from where.
+"""Arguments for pip to install the solver: which lock, which build of PyTorch, from where.
 
-Standard library only. Every package is pinned; where its hash is known, no other file is taken for it.
+Every package is pinned, and where its hash is known, checked. Standard library only.
 """
 
 from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,8 +19,7 @@ from . import locks
 from .environment import answer
 
 TORCH = "https://download.pytorch.org/whl/"
-"""Where PyTorch keeps the builds that are not on PyPI, whose build for Linux brings CUDA and whose build for Windows is
-for the CPU."""
+"""Index of PyTorch's builds that are not on PyPI, which has CUDA for Linux and the CPU for Windows."""
 BUILDS = {
     ("linux", "cpu"): "cpu",
     ("linux", "cuda"): "",
@@ -29,20 +28,22 @@ BUILDS = {
     ("darwin", "cpu"): "",
     ("darwin", "apple"): "",
 }
-"""Which of them a system and its choice need; '' for PyPI's. On a Mac there is one build, for both."""
+"""System and device -> build in that index, '' for PyPI's; on a Mac one build serves both."""
 SOURCES = ("pytorch", "pip", "folder")
-"""Where packages come from: PyTorch from its own index for the builds above and the others from where this machine's
-pip is set up to look; or all from there (pip.conf, PIP_INDEX_URL and their like: a studio's mirror), which then also
-decides what the build computes on; or all from a folder of wheels."""
+"""Where packages come from: PyTorch's builds from its own index, and the rest from the index that pip is configured for
+(PyPI, a studio's mirror); everything from there; or everything from a folder of wheels."""
 PINNED = ("--no-deps", "--only-binary", ":all:")
 INSTALL = ("-I", "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--no-user")
-"""What a Python is told before that: `user = true` in somebody's pip.conf is not for this environment, where pip would
-refuse it."""
+"""Arguments of Python before those; --no-user, as `user = true` in a pip.conf would fail in an environment."""
+
+
+def shorten(error: str) -> str:
+    """Return pip's error for the middle of a sentence."""
+    return error.removeprefix("ERROR: ").rstrip(".") or "no message"
 
 
 def compute_of(choice: str) -> str:
-    """What 'auto' means on this machine: 'apple' on a Mac, 'cuda' with NVIDIA's driver, else 'cpu'. Raises Problem for
-    what cannot be here."""
+    """Resolve "auto" to "apple" on a Mac, "cuda" with NVIDIA's driver, else "cpu". Raises Problem."""
     system = "linux" if sys.platform.startswith("linux") else sys.platform
     if choice == "auto":
         choice = "apple" if system == "darwin" else "cuda" if shutil.which("nvidia-smi") else "cpu"
@@ -52,14 +53,13 @@ def compute_of(choice: str) -> str:
 
 
 def lock_of(base: Path, requirements: Path) -> locks.Lock:
-    """The lock for a Python on this machine. Raises Problem where there is none."""
+    """Return the lock for a Python on this machine. Raises Problem if there is none."""
     return locks.read(requirements, locks.lock_name(answer(base, locks.DESCRIBE)))
 
 
 @dataclass(frozen=True)
 class PipStep:
-    """The arguments of one `pip install` or `pip download`, and those of the ones to run in its place where pip cannot
-    carry it out."""
+    """Arguments of one `pip install` or `pip download`, and of the runs that replace it if it fails."""
 
     words: tuple[str, ...]
     otherwise: tuple[tuple[str, ...], ...] = ()
@@ -68,33 +68,25 @@ class PipStep:
 def plan_steps(
     requirements: Path, lock: locks.Lock, compute: str, source: str, scratch: Path, wheels: Path | None = None
 ) -> list[PipStep]:
-    """What pip is to do in turn.
+    """Return the steps that install a lock for a device, from one of SOURCES.
 
-    Parameters
-    ----------
-    requirements : the folder of requirements and locks
-    lock : of the Python and the machine
-    compute : 'cpu', 'cuda' or 'apple'
-    source : one of SOURCES
-    scratch : the folder for files that pip is to read
-    wheels : the folder of 'folder'
+    `scratch` is a folder for files that pip reads, `wheels` the folder of the source "folder".
     """
     system = {"win_amd64": "win32", "macosx_arm64": "darwin"}.get(lock.platform, "linux")
     where = ("--no-index", "--find-links", str(wheels)) if source == "folder" else ()
     checked, whole = (*PINNED, "--require-hashes", *where), str(Path(requirements) / "locks" / f"{lock.name}.txt")
     build, own = BUILDS.get((system, compute), ""), locks.beside(requirements, lock.name, compute)
     cuda = locks.beside(requirements, lock.name, "cuda")
-    # the index's PyTorch for Linux needs them
+    # needed by the index's PyTorch for Linux
     libraries = ((*checked, "-r", str(cuda)),) if system == "linux" and cuda is not None else ()
     if own is None or not build:
         return [PipStep((*checked, "-r", whole)), *map(PipStep, libraries)]
-    rest = str(
-        _write(Path(scratch) / "wildcap_packages.txt", (line for name, line in lock.lines.items() if name != "torch"))
-    )
-    torch = str(_write(Path(scratch) / "wildcap_torch.txt", [lock.lines["torch"]]))
+    others = [line for name, line in lock.lines.items() if name != "torch"]
+    rest = _write(Path(scratch) / "wildcap_packages.txt", others)
+    torch = _write(Path(scratch) / "wildcap_torch.txt", [lock.lines["torch"]])
     hashes = ("--require-hashes",) if locks.read(requirements, f"{lock.name}-{compute}").verified else ()
     links = ("--find-links", f"{TORCH}{build}/torch/") if source == "pytorch" else where
-    # an index that is not PyTorch's may have its build or not
+    # another index than PyTorch's may lack its build
     instead = () if source == "pytorch" else ((*checked, "-r", torch), *libraries)
     return [PipStep((*checked, "-r", rest)), PipStep((*PINNED, *hashes, *links, "-r", str(own)), instead)]
 
@@ -104,8 +96,7 @@ def carry_out(
     run: Callable[[tuple[str, ...]], tuple[int, str]],
     say: Callable[[int], None] = lambda done: None,
 ) -> tuple[int, str]:
-    """Runs steps in turn until one fails; the exit code and the last error of the last. `say` takes how many are
-    done."""
+    """Run steps until one fails; return the last exit code and error. `say` takes the number of finished steps."""
     code, error = 0, ""
     for done, step in enumerate(todo):
         say(done)
@@ -119,7 +110,7 @@ def carry_out(
     return code, error
 
 
-def _write(path: Path, lines: Iterable[str]) -> Path:
+def _write(path: Path, lines: list[str]) -> str:
     with replacing(path) as temporary:
         temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
-    return path
+    return str(path)

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A report about a problem, for the user to send: a zip of logs, versions, settings and states. No picture is in it,
-and nothing that tells who or where.
+"""A report about a problem for the user to send: a zip of logs, versions, settings and states, without pictures.
 
-Names of people, machines, folders and files of the user's are taken out of every text (`Scrubber`). Nothing is sent.
-Standard library only.
+`Scrubber` removes the user's names of people, machines, folders and files from every text. Nothing is sent. Standard
+library only.
 """
 
 from __future__ import annotations
@@ -20,8 +19,6 @@ import socket
 import sys
 import unicodedata
 import zipfile
-from collections.abc import Iterable
-from dataclasses import fields
 from pathlib import Path, PurePosixPath
 
 from .. import __version__
@@ -38,8 +35,7 @@ from ..settings import settings as known_settings
 from . import doctor
 from .job import last_settings
 
-LOG_BYTES = 256 << 10
-"""Of each log, its end."""
+LOG_BYTES = 256 << 10  # of the end of each log
 TOLD = ("logs", "versions", "settings", "which stages ended and with what figures", "what the doctor says")
 REMOVED = "<removed>"
 DIGIT = "[0-9]"
@@ -84,48 +80,18 @@ OWN_FILES = (
     "checkpoints/solve.safetensors",
     "switchlight/*.png",
 )
-"""Files of a capture that WildCap gives their names, as patterns: they tell nothing of the user."""
+"""Patterns of the files in a capture that WildCap names."""
 ABSOLUTE = re.compile(r"""(?<![\w<>:/\\.])(?:file:/{1,3}|[A-Za-z]:[\\/]|\\\\|~[\w.-]*[\\/]|/(?=[^\s/]))""")
-"""Where an absolute path begins: POSIX, a drive, a server's share, somebody's home, a file's URL."""
-COMMON = {
-    "root",
-    "user",
-    "admin",
-    "frames",
-    "video",
-    "capture",
-    "photographs",
-    "home",
-    "users",
-    "tmp",
-    "var",
-    "wildcap",
-    "head",
-    "mesh",
-    "template",
-}
-"""Words that tell nobody's name, and stand in every log."""
+"""Start of an absolute path: POSIX, a drive, a server's share, a home folder, a file's URL."""
+COMMON = set("root user admin frames video capture photographs home users tmp var wildcap head mesh template".split())
+"""Words of every log that are nobody's name."""
 
 
 def write(target: Path, root: Path, python: Path | None, capture: Capture | None = None, **versions: str) -> Path:
-    """Writes the zip.
+    """Write the zip `target`, with that ending, and return its path.
 
-    Parameters
-    ----------
-    target : the zip; its ending is added where it lacks one
-    root : the folder that holds core/
-    python : the worker's, None: there is none
-    capture : that the problem is with, or None
-    versions : of the host's programs, by name
-
-    Returns
-    -------
-    The path of the zip.
-
-    Raises
-    ------
-    Problem
-        For a file that is there already, and where it cannot be written.
+    `root` holds core/, `python` is the worker's, if there is one, `versions` are those of the host's programs. Raises
+    Problem if the file exists already or cannot be written.
     """
     target = Path(target)
     if target.suffix.lower() != ".zip":
@@ -136,19 +102,16 @@ def write(target: Path, root: Path, python: Path | None, capture: Capture | None
         )
     scrub = Scrubber(root, python, capture)
     texts = {"doctor.txt": _examined(root, python), "unforeseen.txt": "\n".join(unforeseen.recent), **_logs(capture)}
-    told = {
-        "versions": {
-            "WildCap": __version__,
-            "Python": platform.python_version(),
-            "system": platform.system(),
-            "release": platform.release(),
-            "machine": platform.machine(),
-            "processors": os.cpu_count(),
-            **versions,
-        },
-        "capture": _described(capture),
+    system = {
+        "WildCap": __version__,
+        "Python": platform.python_version(),
+        "system": platform.system(),
+        "release": platform.release(),
+        "machine": platform.machine(),
+        "processors": os.cpu_count(),
     }
-    texts["report.json"] = json.dumps(told, indent=1, ensure_ascii=False)
+    report = {"versions": {**system, **versions}, "capture": _described(capture)}
+    texts["report.json"] = json.dumps(report, indent=1, ensure_ascii=False)
     with replacing(target) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in texts.items():
             archive.writestr(name, scrub(text))
@@ -156,39 +119,35 @@ def write(target: Path, root: Path, python: Path | None, capture: Capture | None
 
 
 class Scrubber:
-    """Takes out of a text what tells who the user is and where their files lie. What lies in the extension, in the
-    capture or in Python's folders keeps its path from there on, for that is what a report is about."""
+    """Removes names and paths of the user; paths in the extension, the capture and Python's folders keep their end."""
 
-    def __init__(
-        self, root: Path, python: Path | None = None, capture: Capture | None = None, more: Iterable[str] = ()
-    ):
-        known = {root: "<WildCap>", sys.prefix: "<Python>", sys.base_prefix: "<Python>"}
+    def __init__(self, root: Path, python: Path | None = None, capture: Capture | None = None):
+        places = {root: "<WildCap>", sys.prefix: "<Python>", sys.base_prefix: "<Python>"}
         if python is not None:
-            known[Path(python).parent.parent] = "<solver>"
+            places[Path(python).parent.parent] = "<solver>"
         if capture is not None:
-            known[capture.root] = "<capture>"
+            places[capture.root] = "<capture>"
         self._places = sorted(
             (
                 (form, word)
-                for place, word in known.items()
+                for place, word in places.items()
                 for path in {str(place), os.path.realpath(place)}
                 for form in _forms(path)
             ),
             key=lambda pair: -len(pair[0]),
         )
-        names = {*_own_names(), *(_names_of(capture) if capture is not None else ()), *more}
+        names = _own_names() | (_names_of(capture) if capture is not None else set())
         self._names = sorted(
             {form for name in names for form in _forms(name) if len(name) > 1 and name.lower() not in COMMON},
             key=len,
             reverse=True,
         )
-        key = os.environ.get(switchlight_api.KEY_VARIABLE, "").strip()
-        self._secrets = [key] if key else []
+        self._key = os.environ.get(switchlight_api.KEY_VARIABLE, "").strip()
 
     def __call__(self, text: str) -> str:
         text = unicodedata.normalize("NFC", text)
-        for secret in self._secrets:
-            text = text.replace(secret, REMOVED)
+        if self._key:
+            text = text.replace(self._key, REMOVED)
         for place, word in self._places:
             text = re.sub(re.escape(place) + r"(?=[\\/'\"\s:,;.)]|$)", word, text, flags=re.IGNORECASE)
         text = re.sub(r"<capture>[\\/]+([^\s'\":,;)]*)", lambda found: f"<capture>/{_own_file(found[1])}", text)
@@ -199,35 +158,32 @@ class Scrubber:
 
 
 def _own_file(inside: str) -> str:
-    """A file's path in the capture where it is one that WildCap gives; others have names of the user's."""
+    """Return a path in the capture if WildCap names the file, else "<file>": others have names of the user's."""
     inside = re.sub(r"[\\/]+", "/", inside)
     stem = inside.rstrip(".")
-    return (
-        inside if stem in LOGS | BOOKS or any(fnmatch.fnmatchcase(stem, pattern) for pattern in OWN_FILES) else "<file>"
-    )
+    is_own = stem in LOGS | BOOKS or any(fnmatch.fnmatchcase(stem, pattern) for pattern in OWN_FILES)
+    return inside if is_own else "<file>"
 
 
 def _without_paths(line: str) -> str:
-    """A line without its absolute paths. Nobody can tell where one that holds blanks ends, but by the quote that it
-    began with: the rest of the line goes."""
-    done = ""
+    """Return a line without absolute paths, which end at a closing quote, else with the line: they may hold blanks."""
+    cleaned = ""
     while path_match := ABSOLUTE.search(line):
         quote = line[path_match.start() - 1] if path_match.start() and line[path_match.start() - 1] in "'\"`" else ""
         end = line.find(quote, path_match.end()) if quote else -1
-        done += line[: path_match.start()] + "<path>"
+        cleaned += line[: path_match.start()] + "<path>"
         line = line[end:] if end >= 0 else ""
-    return done + line
+    return cleaned + line
 
 
 def _forms(text: str) -> set[str]:
-    """A text as it may stand in a log: composed, with either slash, and with backslashes doubled as JSON and repr write
-    them."""
+    """Return a text's forms in logs: composed, with either slash, and with backslashes doubled as in JSON and repr."""
     composed = unicodedata.normalize("NFC", str(text))
     return {composed, composed.replace("\\", "\\\\"), composed.replace("\\", "/"), json.dumps(composed)[1:-1]}
 
 
 def _own_names() -> set[str]:
-    """The user's, the home's and the machine's."""
+    """Return the names of the user, the home folder and the machine."""
     names = {platform.node(), platform.node().partition(".")[0], Path.home().name}
     with contextlib.suppress(OSError, KeyError, ImportError):
         names |= {getpass.getuser(), socket.gethostname()}
@@ -235,8 +191,7 @@ def _own_names() -> set[str]:
 
 
 def _names_of(capture: Capture) -> set[str]:
-    """The capture's, those of its source and of the folders they lie in, of the photographs, and of what settings name
-    elsewhere: a head mesh, other captures of the person."""
+    """Return the names of the capture, its source and their folders, and of files and captures in the settings."""
     names = {capture.root.stem, *capture.root.absolute().parts}
     for path in _chosen_paths(capture):
         names |= {path.stem, *path.parts}
@@ -255,14 +210,14 @@ def _names_of(capture: Capture) -> set[str]:
 
 
 def _chosen_paths(capture: Capture) -> list[Path]:
-    """What the settings of the last job, and those that finished stages were run with, name outside of the capture."""
+    """Return the paths in the settings of the last job and of finished stages."""
     paths: list[Path] = []
-    told: list[dict] = []
+    groups: list[dict] = []
     with contextlib.suppress(Problem, OSError):
-        told.append(known_settings.to_json(last_settings(capture)))
+        groups.append(known_settings.to_json(last_settings(capture)))
     with contextlib.suppress(Problem, OSError):
-        told += [{name: entry.get("settings")} for name, entry in capture.read()["stages"].items()]
-    for by_stage in told:
+        groups += [{name: entry.get("settings")} for name, entry in capture.read()["stages"].items()]
+    for by_stage in groups:
         convert_settings(by_stage, lambda path: paths.append(Path(path)))
     return paths
 
@@ -277,7 +232,7 @@ def _examined(root: Path, python: Path | None) -> str:
 
 
 def _logs(capture: Capture | None) -> dict[str, str]:
-    """Name in the zip -> text, of the logs that are there; those of others are not ours to send."""
+    """Return name in the zip -> text, of WildCap's own logs."""
     logs = {}
     for name in sorted(LOGS) if capture is not None else ():
         with contextlib.suppress(OSError), open(capture.root / name, "rb") as file:
@@ -287,14 +242,14 @@ def _logs(capture: Capture | None) -> dict[str, str]:
 
 
 def _described(capture: Capture | None) -> dict:
-    """The stages with their figures, and the settings without paths."""
+    """Return the stages with their figures, and the settings without paths."""
     if capture is None:
         return {}
     try:
         record, chosen = capture.read(), last_settings(capture)
     except Problem as problem:
         return {"problem": str(problem)}
-    done = {
+    finished = {
         name: {
             "state": capture.state(stages.by_name(name), chosen),
             **{key: stage.get(key) for key in ("seconds", "version", "device", "figures")},
@@ -302,14 +257,13 @@ def _described(capture: Capture | None) -> dict:
         for name, stage in record["stages"].items()
         if name in stages.NAMES
     }
-    return {"stages": done, "stopped": record.get("stopped"), "settings": _without_path_settings(chosen)}
+    return {"stages": finished, "stopped": record.get("stopped"), "settings": _without_path_settings(chosen)}
 
 
 def _without_path_settings(chosen: known_settings.Settings) -> dict:
-    told = known_settings.to_json(chosen)
-    for group in fields(chosen):
-        of_group = getattr(chosen, group.name)
-        for setting in fields(of_group) if isinstance(told[group.name], dict) else ():
-            if setting.metadata.get("path") and told[group.name][setting.name]:
-                told[group.name][setting.name] = REMOVED
-    return told
+    values = known_settings.to_json(chosen)
+    for name, field in known_settings.known_settings().items():
+        stage, _, own = name.rpartition(".")
+        if field.metadata.get("path") and values[stage][own]:
+            values[stage][own] = REMOVED
+    return values

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture on a disk that nothing can be written to, as an archive's, is delivered from a stand-in beside the
-delivery. Standard library only."""
+"""A writable stand-in for a capture on a read-only disk, such as an archive's. Standard library only."""
 
 from __future__ import annotations
 
@@ -19,9 +18,10 @@ from ..capture.messages import Problem
 
 @contextlib.contextmanager
 def stand_in(capture: Capture, folder: str) -> Iterator[Capture]:
-    """The capture itself where it can be written to; else one of the same name in a temporary folder within `folder`,
-    with links to its files (copies where the system has no links), which is gone afterwards. Raises Problem where no
-    folder is named, or that cannot be written to either."""
+    """Yield the capture if it is writable, else a temporary one in `folder` with links to its files, or copies.
+
+    Raises Problem if the folder is '' or read-only as well.
+    """
     if _is_writable(capture.root):
         yield capture
         return
@@ -42,8 +42,7 @@ def stand_in(capture: Capture, folder: str) -> Iterator[Capture]:
 
 
 def _stand_in(source: Path, target: Path) -> None:
-    """Fills a new folder. It does not get the other one's mode, as shutil.copytree would give it: nothing could be
-    written there, or removed."""
+    """Fill a new folder, which keeps its own mode: that of the source, as shutil.copytree gives it, is read-only."""
     target.mkdir(parents=True)
     for path in source.iterdir():
         if path.is_dir() and not path.name.startswith("."):
@@ -53,7 +52,7 @@ def _stand_in(source: Path, target: Path) -> None:
 
 
 def _link(source: Path, target: Path) -> None:
-    """The books are written to, so they are copied; so is what no link can be made of."""
+    """Link a file; copy records, which are written to, and where the system has no links."""
     if source.suffix not in (".json", ".jsonl"):
         with contextlib.suppress(OSError, NotImplementedError):
             os.symlink(source.absolute(), target)
@@ -62,7 +61,7 @@ def _link(source: Path, target: Path) -> None:
 
 
 def _is_writable(folder: Path) -> bool:
-    """Whether a file can be made in a folder: on Windows its permissions alone do not tell."""
+    """Return whether a file can be made in a folder; on Windows permissions alone do not tell."""
     try:
         with tempfile.TemporaryFile(dir=folder):
             return os.access(folder, os.W_OK)

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs a job's stages over its capture: skips what is fresh, records what ended well, explains what did not.
+"""A job's stages run over its capture: fresh ones are skipped, successes recorded, failures explained.
 
-Every way a stage can end becomes one message. A traceback goes to the stage's log and nowhere else.
+Every way a stage can end becomes one message. Tracebacks go to the stage's log and nowhere else.
 """
 
 from __future__ import annotations
@@ -41,39 +41,34 @@ from .stage_log import at_work
 def run_job(
     path: Path, emit: Callable[[Message], None] = lambda message: None, cancelled: Callable[[], bool] = lambda: False
 ) -> Message:
-    """Runs the job file `path`, sends what happens through `emit` and returns the final message, which is not sent.
+    """Run the job file `path`, send messages through `emit` and return the final one, which is not sent.
 
-    The capture's lock is given back before the return, so whoever reads the final message may start the next job.
+    The capture's lock is released before: whoever reads the final message may start the next job.
     """
     started = time.monotonic()
     stage = ""
     try:
         job = read_job(path)
         with job.capture.locked(lambda text: emit(Log(text)), cancelled):
-            if job.tool is None:
-                _take_source(job, emit)
-            _check_device(job.settings.device)
-            if job.tool is None:
-                _check_paths(job)
             if job.tool is not None:
+                _check_device(job.settings.device)
                 stage = job.tool.name
                 _run_tool(job.tool, job, emit, cancelled)
                 return Done(round(time.monotonic() - started, 2))
+            _take_source(job, emit)
+            _check_device(job.settings.device)
+            _check_paths(job)
             if job.force:
                 job.capture.forget([stage.name for stage in job.chain])
-            kept = []
+            outdated = []
             for step in job.chain:
                 stage = step.name
                 if cancelled():
                     raise CancelledError(stage)
-                kept += [step.label] if run_stage(step, job, emit, cancelled) == OLDER else []
-            if kept:
-                emit(
-                    Log(
-                        f"Made by older code and kept: {', '.join(kept)}. Run a stage again to have it made by "
-                        f"WildCap {__version__}."
-                    )
-                )
+                outdated += [step.label] if run_stage(step, job, emit, cancelled) == OLDER else []
+            if outdated:
+                words = f"Made by older code and kept: {', '.join(outdated)}. "
+                emit(Log(f"{words}Run a stage again to have it made by WildCap {__version__}."))
     except CancelledError:
         return Cancelled(stage)
     except Exception as error:
@@ -83,19 +78,9 @@ def run_job(
 
 
 def run_stage(stage: Stage, job: JobRequest, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> str:
-    """Runs one stage, records it, and rebuilds the report, unless the stage is finished: done, or made by older code,
-    which is not ours to replace. Raises whatever the stage raises.
+    """Run and record a stage and rebuild the report, unless it is finished, also by older code; return its prior state.
 
-    Parameters
-    ----------
-    stage : to run
-    job : with the capture and the settings
-    emit : takes the messages
-    cancelled : whether it is to end
-
-    Returns
-    -------
-    The state that the stage was found in.
+    Raises whatever the stage raises.
     """
     capture, settings = job.capture, job.settings
     state = capture.state(stage, settings)
@@ -105,15 +90,15 @@ def run_stage(stage: Stage, job: JobRequest, emit: Callable[[Message], None], ca
         return state
     with at_work(stage, capture, emit, cancelled) as reporter:
         try:
-            # Outputs may be half new from here on: until the end, nobody may take them for the recorded result.
+            # from here on outputs may be half new: the record must not vouch for them
             capture.forget([stage.name])
             settings = _with_device(stage, settings, reporter)
             conditions = capture.conditions(stage, settings)
             started = time.monotonic()
             _room(stage).run(capture, settings, reporter)
-            lost = [name for name in stage.writes if not capture.has(name)]
-            if lost:
-                raise RuntimeError(f"the stage {stage.name} ended without writing {lost[0]}")
+            missing = [name for name in stage.writes if not capture.has(name)]
+            if missing:
+                raise RuntimeError(f"the stage {stage.name} ended without writing {missing[0]}")
             seconds = time.monotonic() - started
             capture.finish(stage, conditions, seconds, settings, reporter.figures, __version__, reporter.findings)
             report.write(capture, settings)
@@ -127,7 +112,7 @@ def run_stage(stage: Stage, job: JobRequest, emit: Callable[[Message], None], ca
 
 
 def _run_tool(tool: Stage, job: JobRequest, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
-    """Runs one of stages.TOOLS and sends its figures. Raises whatever it raises."""
+    """Run one of stages.TOOLS and send its figures. Raises whatever it raises."""
     started = time.monotonic()
     with at_work(tool, job.capture, emit, cancelled) as reporter:
         _room(tool).run(job.capture, _with_device(tool, job.settings, reporter), reporter)
@@ -135,8 +120,7 @@ def _run_tool(tool: Stage, job: JobRequest, emit: Callable[[Message], None], can
 
 
 def explained(error: Exception, stage: str, log: Path) -> Problem:
-    """What any exception means to the user: a problem and a remedy, both whole sentences. The traceback of one that
-    nobody foresaw goes to `log`."""
+    """Return the problem and remedy behind an exception; the traceback of an unforeseen one goes to `log`."""
     if isinstance(error, Problem):
         return error
     during = f"the stage {stage}" if stage else "the job"
@@ -156,13 +140,12 @@ def explained(error: Exception, stage: str, log: Path) -> Problem:
 
 
 def _take_source(job: JobRequest, emit: Callable[[Message], None]) -> None:
-    """Records the source where the job begins with the stage that reads it. Raises Problem when there is none, or
-    another one than before."""
+    """Record the source if the job begins with the first stage. Raises Problem if it is missing or another one."""
     if job.chain[0].reads:
         return
     capture, first = job.capture, job.chain[0]
-    known = capture.source
-    source = Path(job.source) if job.source else known
+    previous = capture.source
+    source = Path(job.source) if job.source else previous
     if source is None:
         raise Problem("This capture has no video yet.", "Choose a video or a folder of photographs.")
     if not source.exists():
@@ -171,7 +154,7 @@ def _take_source(job: JobRequest, emit: Callable[[Message], None]) -> None:
                 f"There is no video or folder at {source}.",
                 "Check its name and whether the disk it is on is connected.",
             )
-        emit(Log(f"{source} is not there any more; what was taken from it is used."))
+        emit(Log(f"{source} no longer exists; the frames taken from it are used."))
         return
     try:
         if job.force or capture.made_from(source):
@@ -180,19 +163,18 @@ def _take_source(job: JobRequest, emit: Callable[[Message], None]) -> None:
     except PermissionError as error:
         raise Problem(
             f"{error.filename or source} cannot be read.",
-            "Change its permissions (on a Mac: System Settings, Privacy & Security, Files and Folders), or "
-            "copy it to a folder that Blender may read.",
+            "Change its permissions (on a Mac: System Settings, Privacy & Security, Files and Folders), or copy it to "
+            "a folder that Blender may read.",
         ) from error
     raise Problem(
-        f"This capture was made from {known.name if known else 'another source'}, not from this {source.name}.",
+        f"This capture was made from {previous.name if previous else 'another source'}, not from this {source.name}.",
         f"Choose another capture folder for another video, or run the stage {first.label} again (in a "
         f"terminal: --from {first.name}) to replace everything but the painted masks.",
     )
 
 
 def _check_paths(job: JobRequest) -> None:
-    """Raises Problem, before any stage runs, for what the settings name and a later stage would miss. What a finished
-    stage was made from may have gone since."""
+    """Raise Problem, before any stage runs, for missing files in the settings of stages that are not finished."""
     for step in job.chain:
         try:
             check_paths(job.settings, [step.name])
@@ -202,7 +184,7 @@ def _check_paths(job: JobRequest) -> None:
 
 
 def _check_device(device: str) -> None:
-    """Raises Problem for a device that this machine does not have. torch is imported for GPUs only."""
+    """Raise Problem for a device that this machine lacks; import torch for GPUs only."""
     if device not in ("cpu", "auto"):
         import torch
 
@@ -214,8 +196,7 @@ def _check_device(device: str) -> None:
 
 
 def _with_device(step: Stage, settings: Settings, reporter: Reporter) -> Settings:
-    """The settings with the device that was proven in the place of auto, where a step computes on one; why that one
-    goes to its log."""
+    """Return the settings of a step on a device with the proven device for "auto"."""
     if settings.device != "auto" or not step.on_device:
         return settings
     proof = importlib.import_module("..stages.solve.device", __package__).prove()
@@ -224,5 +205,5 @@ def _with_device(step: Stage, settings: Settings, reporter: Reporter) -> Setting
 
 
 def _room(step: Stage):
-    """The module that does a stage's or tool's work; importing it may take seconds."""
+    """Import the module of a stage or tool, which may take seconds."""
     return importlib.import_module("." + step.module.split(".", 1)[1], __package__.rpartition(".")[0])

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Self-Test: the job that solves a copy of the sample head again. Standard library only; what it computes is
-core.stages.solve.self_test's."""
+"""Self-Test: the job that solves a copy of the sample head again, by core.stages.solve.self_test.
+
+Standard library only.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +14,12 @@ from ..capture.sample_head import copy_to
 from .job import write_job
 
 SKIN_TONE = "0.6793,0.5099,0.4424"
-"""The sample's own, sRGB: research/people/sample/skin_tone.txt."""
+"""sRGB of the sample, as in research/people/sample/skin_tone.txt."""
 
 
 def prepare(folder: Path, seed: int = 0, device: str = "auto") -> Capture:
-    """A copy of the sample head in `folder`, new and for this alone, with the job for it: the draft, which takes
-    seconds. Raises Problem where it cannot be written."""
+    """Copy the sample head to an empty folder and write the job: a draft, which takes seconds. Raises Problem."""
     capture = copy_to(folder)
-    write_job(
-        capture,
-        tool="self_test",
-        quality="draft",
-        settings={"solve": {"skin_tone": SKIN_TONE}, "seed": seed, "device": device},
-    )
+    settings = {"solve": {"skin_tone": SKIN_TONE}, "seed": seed, "device": device}
+    write_job(capture, tool="self_test", quality="draft", settings=settings)
     return capture

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The commands that set a machine up: python -m core install and wheels. Standard library only: the Python that runs
-them has no packages yet."""
+"""Commands that set a machine up: python -m core install and wheels.
+
+Standard library only: the Python that runs them has no packages yet.
+"""
 
 from __future__ import annotations
 
@@ -21,52 +23,28 @@ POLL_S = 0.1  # between two looks at the installation
 
 
 def add_commands(commands) -> None:
-    """Adds them to the subparsers of `python -m core`."""
-    install = add_command(
-        commands, "install", _install, "make the solver's environment from this Python, as Install Solver does"
-    )
-    install.add_argument(
-        "folder", metavar="FOLDER", type=Path, help="new, empty, or one that an earlier installation began"
-    )
-    install.add_argument(
-        "--wheels", metavar="FOLDER", type=Path, help="a folder of wheels to install from, without a network"
-    )
+    """Add the commands to the subparsers of `python -m core`."""
+    install = add_command(commands, "install", _install, "make the solver's environment from this Python")
+    install.add_argument("folder", metavar="FOLDER", type=Path, help="new, empty, or one of an earlier installation")
+    install.add_argument("--wheels", metavar="FOLDER", type=Path, help="install from a folder of wheels, offline")
     _add_build(install)
-    bring = add_command(
-        commands,
-        "wheels",
-        _wheels,
-        "download all wheels of a platform into a folder, to install from without a network",
-        "FOLDER",
-    )
-    bring.add_argument(
-        "--for",
-        dest="name",
-        choices=locks.names(),
-        metavar="PLATFORM-PYTHON",
-        help=f"{', '.join(locks.names())}; this machine and Python without it",
-    )
+    bring = add_command(commands, "wheels", _wheels, "download all wheels to install from offline", "FOLDER")
+    names = f"{', '.join(locks.names())}; by default this machine and Python"
+    bring.add_argument("--for", dest="name", choices=locks.names(), metavar="PLATFORM-PYTHON", help=names)
     _add_build(bring)
 
 
 def _add_build(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--compute", choices=("auto", "cpu", "cuda", "apple"), default="auto", help="what PyTorch computes on"
-    )
-    parser.add_argument(
-        "--packages",
-        choices=("pytorch", "pip"),
-        default="pytorch",
-        help="where PyTorch comes from: its own index where PyPI lacks the build, or with all others "
-        "from where pip is set up to look",
-    )
+    computes = ("auto", "cpu", "cuda", "apple")
+    parser.add_argument("--compute", choices=computes, default="auto", help="device that PyTorch is built for")
+    words = "source of PyTorch: its own index where PyPI lacks the build, or the index that pip is configured for"
+    parser.add_argument("--packages", choices=("pytorch", "pip"), default="pytorch", help=words)
 
 
 def _install(options: argparse.Namespace) -> int:
     folder = options.folder.absolute()
-    source = installation.PackageSource(
-        options.compute, "folder" if options.wheels else options.packages, options.wheels
-    )
+    kind = "folder" if options.wheels else options.packages
+    source = installation.PackageSource(options.compute, kind, options.wheels)
     log = folder.with_name(f"{folder.name}.wildcap-install.log")
     task = installation.installation(folder, REQUIREMENTS, log, Path(sys.executable), source)
     _follow(task)
@@ -81,20 +59,16 @@ def _wheels(options: argparse.Namespace) -> int:
         raise Problem(f"There is no solver for {compute} on {name}.", "Leave --compute out, or choose another.")
 
     def work(task: BackgroundTask):
-        return wheels.download(
-            REQUIREMENTS,
-            name,
-            compute,
-            options.packages,
-            options.folder,
-            lambda command: task.run(command, lambda line: _hear(task, line)),
-        )
+        def run(command) -> tuple[int, str]:
+            return task.run(command, lambda line: _hear(task, line))
+
+        return wheels.download(REQUIREMENTS, name, compute, options.packages, options.folder, run)
 
     task = BackgroundTask("wheels", work)
     _follow(task)
+    size = index.gigabytes(sum(path.stat().st_size for path in task.result))
     print(
-        f"{len(task.result)} wheels for {name} in {options.folder}, "
-        f"{index.gigabytes(sum(path.stat().st_size for path in task.result))}; "
+        f"{len(task.result)} wheels for {name} in {options.folder}, {size}; "
         f"`python -m core install FOLDER --wheels {options.folder}` installs from them, and so does Install Solver"
     )
     return 0
@@ -106,7 +80,7 @@ def _hear(task: BackgroundTask, line: str) -> None:
 
 
 def _follow(task: BackgroundTask) -> None:
-    """Runs a task to its end, its progress on stderr. Raises the Problem that it ends with."""
+    """Run a task to its end, with its progress on stderr. Raises Problem if it fails."""
     task.start()
     try:
         while task.running:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The log of a stage: what it and the libraries below it print, and the traceback of what stops it, go there."""
+"""The log of a stage: everything that is printed while it runs, and the traceback if it fails."""
 
 from __future__ import annotations
 
@@ -20,20 +20,7 @@ from ..capture.stages import Stage
 
 @contextlib.contextmanager
 def at_work(step: Stage, capture: Capture, emit: Callable[[Message], None], cancelled: Callable[[], bool]):
-    """The reporter of a stage or tool; what is printed meanwhile, and the traceback of what stops it, go to its log.
-
-    Parameters
-    ----------
-    step : the stage or tool
-    capture : that has the log
-    emit : takes the messages
-    cancelled : whether it is to end
-
-    Raises
-    ------
-    Problem
-        Where an input is missing.
-    """
+    """Yield a stage's or tool's reporter, and send output and traceback to its log. Raises Problem without inputs."""
     missing = [name for name in step.reads if not capture.has(name)]
     if missing:
         raise Problem(
@@ -46,26 +33,24 @@ def at_work(step: Stage, capture: Capture, emit: Callable[[Message], None], canc
         try:
             yield Reporter(step.name, _logging(emit, log), cancelled)
         except Problem as problem:
-            with contextlib.suppress(OSError):  # the disk may be full; that is said elsewhere
-                traceback.print_exception(problem, file=log)  # what it came from is of use to whoever reads the log
+            with contextlib.suppress(OSError):  # the disk may be full
+                traceback.print_exception(problem, file=log)
             raise
         finally:
             for kept in sorted(ownership.kept_files(capture.root) - kept_before):
-                emit(
-                    Log(f"A file was not as WildCap had written it, and was in the way of a new one: it is now {kept}.")
-                )
+                emit(Log(f"A file that was changed since WildCap wrote it made way for a new one: it is now {kept}."))
 
 
 @contextlib.contextmanager
 def _log_of(capture: Capture, stage: Stage):
-    """logs/STAGE.log as an open text file; stdout and stderr, also of C++ libraries, go there meanwhile."""
+    """Open logs/STAGE.log and redirect stdout and stderr to it, also those of C++ libraries."""
     path = capture.logs / f"{stage.name}.log"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         log = open(path, "w", encoding="utf-8", buffering=1)
     except OSError as error:
         raise storage_problem(error, path) from error
-    kept = [os.dup(1), os.dup(2)]
+    originals = [os.dup(1), os.dup(2)]
     try:
         for descriptor in (1, 2):
             os.dup2(log.fileno(), descriptor)
@@ -74,7 +59,7 @@ def _log_of(capture: Capture, stage: Stage):
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, ValueError):
                 stream.flush()
-        for descriptor, original in zip((1, 2), kept, strict=True):
+        for descriptor, original in zip((1, 2), originals, strict=True):
             os.dup2(original, descriptor)
             os.close(original)
         with contextlib.suppress(OSError):
@@ -82,7 +67,7 @@ def _log_of(capture: Capture, stage: Stage):
 
 
 def _logging(emit: Callable[[Message], None], log) -> Callable[[Message], None]:
-    """`emit` that also keeps the stage's log lines in its log."""
+    """Return `emit` with a copy of the stage's log lines in its log."""
 
     def both(message: Message) -> None:
         if isinstance(message, Log):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A worker followed in a terminal: one line of progress with the time that is left, one line per finished stage."""
+"""A worker in a terminal: one line of progress with the time left, one line per finished stage."""
 
 from __future__ import annotations
 
@@ -20,18 +20,9 @@ POLL_S = 0.1  # between two looks at the job
 
 
 def follow(root: Path, capture: Capture, job: Path, environment: dict[str, str]) -> int:
-    """Runs a job with this Python and prints what it says.
+    """Run a job with this Python and the code in `root`, and print its messages.
 
-    Parameters
-    ----------
-    root : the folder that holds core/
-    capture : that is worked on
-    job : the job file
-    environment : variables of the worker's own, beside ours
-
-    Returns
-    -------
-    The exit code: 0, 2 for a problem, 130 after Ctrl-C.
+    `environment` is added to the worker's. Returns the exit code: 0, 2 for a problem, 130 after Ctrl-C.
     """
     if read_job(job).settings.delight.delighter == "switchlight" and os.environ.get(switchlight_api.KEY_VARIABLE):
         environment = {**environment, switchlight_api.KEY_VARIABLE: os.environ[switchlight_api.KEY_VARIABLE]}
@@ -51,25 +42,21 @@ def follow(root: Path, capture: Capture, job: Path, environment: dict[str, str])
 
 
 def print_message(message: Message, capture: Capture, line: ProgressLine) -> int:
-    """Prints one message; returns the exit code if it is the last one."""
+    """Print a message and return the exit code, which counts if it is the last one."""
     match message:
         case Progress():
             share = message.done / message.of if message.of else 0
             left = f", {_duration(message.eta_s)} left" if message.eta_s and message.eta_s >= 1 else ""
-            line.show(
-                f"{stages.LABELS[message.stage]:12} {share:4.0%}  {message.text}{left}",
-                step=(message.stage, int(share * 4)),
-            )
+            text = f"{stages.LABELS[message.stage]:12} {share:4.0%}  {message.text}{left}"
+            line.show(text, step=(message.stage, int(share * 4)))
         case Log():
             line.keep(message.text)
         case StageDone():
-            line.keep(
-                f"{stages.LABELS[message.stage]:12} "
-                + ("unchanged" if message.skipped else f"done in {_duration(message.seconds)}")
-            )
+            ended = "unchanged" if message.skipped else f"done in {_duration(message.seconds)}"
+            line.keep(f"{stages.LABELS[message.stage]:12} {ended}")
         case Done():
-            told = f" {capture.report} has the pictures and figures." if capture.report.is_file() else ""
-            line.keep(f"Finished in {_duration(message.seconds)}.{told}")
+            where = f" {capture.report} has the pictures and figures." if capture.report.is_file() else ""
+            line.keep(f"Finished in {_duration(message.seconds)}.{where}")
             return 0
         case Cancelled():
             line.keep("Cancelled; finished stages are kept, the same command continues.")
@@ -82,7 +69,7 @@ def print_message(message: Message, capture: Capture, line: ProgressLine) -> int
 
 
 class ProgressLine:
-    """The line that is written over; where the output is no terminal, a new line per quarter of a stage."""
+    """Line that is overwritten; where the output is no terminal, a new line per quarter of a stage."""
 
     def __init__(self):
         self._live = sys.stdout.isatty()

@@ -106,67 +106,49 @@ def test_a_batch_whose_folder_cannot_be_written_is_refused_by_name(folder, capsy
         (",x,,,,", "names no video"),
         ("gone.mp4,,,,,", "no video or folder at"),
         ("anna.mp4,a/b,,,,", "cannot be the name"),
-        ("anna.mp4,..,,,,", "cannot be the name"),
+        ("anna.mp4,-h,,,,", "cannot be the name"),
         ("anna.mp4,CARL,,,,", "The name CARL is taken by Line 2"),
-        ('anna.mp4,,"0.8,0.6",,,', "is not a colour"),
-        ('anna.mp4,,"0.8,0.6,x",,,', "is not a colour"),
         ('anna.mp4,,"0.8,nan,0.5",,,', "is not a colour"),
         ("anna.mp4,,,white,,", "is not a colour"),
         ("anna.mp4,,,,head.obj,", "no file or folder at"),
-        ("anna.mp4,,,,,gone.json", "cannot be read"),
         ("anna.mp4,,,,,shots.csv", "cannot be read"),
-        ("anna.mp4,,,,,,,extra", "more cells than there are columns"),
         ("anna.mp4,,0.8,0.6,0.5,,", "more cells than there are columns"),
     ],
 )
 def test_a_row_that_cannot_be_used_is_told_by_its_line_and_the_rest_is_planned(folder, row, said):
     faces, faults = plan(folder, f"video,name,tone,white,template,settings\ncarl,,,,,\n{row}\nzoë b.mov,,,,,\n")
     assert [face.name for face in faces] == ["carl", "zoë b"]
-    assert (
-        len(faults) == 1
-        and faults[0].problem.startswith("Line 3: ")
-        and said in faults[0].problem
-        and faults[0].remedy.endswith(".")
-    )
+    (fault,) = faults
+    assert fault.problem.startswith("Line 3: ") and said in fault.problem and fault.remedy.endswith(".")
 
 
 @pytest.mark.parametrize(
-    "text, said",
+    "content, said",
     [
-        ("", "names no video"),
-        ("video\n", "names no video"),
-        ("film,name\na,b\n", "'film' that means nothing"),
-        ("name\nb\n", "no column video"),
-        ("video,video\na,b\n", "a column twice"),
-        ("video\n\0\n", "not a text file"),
+        (b"", "names no video"),
+        (b"video\n", "names no video"),
+        (b"film,name\na,b\n", "'film'"),
+        (b"name\nb\n", "no column video"),
+        (b"video,video\na,b\n", "a column twice"),
+        (b"video\n\0\n", "not a text file"),
+        ("video\nzoë.mov\n".encode("latin-1"), "UTF-8"),
+        (b"video\n" + b"x" * 200_000, "cannot be read as a table"),
+        (None, "no table or folder"),
     ],
 )
-def test_a_table_that_is_none_is_refused(folder, text, said):
-    with pytest.raises(Problem) as refused:
-        plan(folder, text)
-    assert said in refused.value.problem and refused.value.remedy.endswith(".")
-
-
-def test_other_tables_that_cannot_be_read(folder):
-    for path, said in (
-        (folder / "none.csv", "no table or folder"),
-        (folder / "latin.csv", "UTF-8"),
-        (folder / "long.csv", "cannot be read as a table"),
-    ):
-        if path.name == "latin.csv":
-            path.write_bytes("video\nzoë.mov\n".encode("latin-1"))
-        if path.name == "long.csv":
-            path.write_text("video\n" + "x" * 200_000 + "\n")
-        with pytest.raises(Problem, match=said):
-            read_faces(path, folder / "batch", "standard", {})
+def test_a_table_that_is_none_is_refused(folder, content, said):
+    if content is not None:
+        (folder / "shots.csv").write_bytes(content)
+    with pytest.raises(Problem, match=said) as refused:
+        read_faces(folder / "shots.csv", folder / "batch", "standard", {})
+    assert refused.value.remedy.endswith(".")
 
 
 def test_a_folder_of_films(folder, capsys):
     (folder / "old.wildcap").mkdir()
     (folder / "old.wildcap" / "capture.json").write_text("{}")
-    assert (
-        main(["batch", "plan", str(folder), str(folder / "batch"), "--quality", "draft", "--set", "solve.steps=9"]) == 0
-    )
+    words = "batch", "plan", str(folder), str(folder / "batch"), "--quality", "draft", "--set", "solve.steps=9"
+    assert main(list(words)) == 0
     assert "4 faces planned" in capsys.readouterr().out
     batch = read_batch(folder / "batch")
     assert [face.name for face in batch.faces] == ["anna.avi", "anna.mp4", "carl", "zoë b"]
@@ -208,7 +190,7 @@ def test_planned_again_it_keeps_the_options_that_are_left_out(folder):
 def test_what_is_no_batch_is_left_alone(folder, capsys):
     new = ["plan", str(folder), str(folder / "b")]
     for words, said in (
-        (["plan", str(folder), str(folder)], "is no batch: it holds"),
+        (["plan", str(folder), str(folder)], "is not a batch"),
         ([*new, "--to", "x"], "--deliver only"),
         ([*new, "--deliver", "lunch"], "deliver.preset"),
         (["status", str(folder)], "no batch at"),
@@ -222,7 +204,6 @@ def test_what_is_no_batch_is_left_alone(folder, capsys):
     "change, said",
     [
         (lambda told: "{", "cannot be read"),
-        (lambda told: "[]", "not a batch record"),
         (lambda told: {**told, "format": 9}, "newer version"),
         (lambda told: {**told, "gate": "door"}, "not a batch record"),
         (lambda told: {**told, "faces": told["faces"] * 2}, "twice"),

@@ -12,35 +12,28 @@ import pytest
 
 from core.capture.messages import Cancelled, CancelledError, Done, Problem
 from core.worker.background import BackgroundTask
+from tests.fixtures.tiny_packages import follow, run
+
+SLEEP = [sys.executable, "-c", "import time; time.sleep(60)"]
 
 
-def follow(task: BackgroundTask, timeout_s: float = 120) -> list:
-    messages, deadline = [], time.monotonic() + timeout_s
-    while task.running:
-        messages += task.poll()
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    return messages
-
-
-def test_a_task_ends_with_its_problem_or_at_once_when_cancelled():
+def test_a_task_ends_with_its_problem_or_at_its_limit():
     def refuse(task):
         raise Problem("It cannot be.", "Let it be.")
 
     for work, problem in ((refuse, "It cannot be."), (lambda task: 1 / 0, "An error inside WildCap stopped")):
-        task = BackgroundTask("try", work)
-        task.start()
-        (ended,) = follow(task, 20)
-        assert ended.problem.startswith(problem)
-    task = BackgroundTask(
-        "slow", lambda task: task.run([sys.executable, "-c", "import time; time.sleep(60)"], limit_s=0.2)
-    )
-    task.start()
-    assert isinstance(follow(task, 20)[-1], Done) and task.result[0] != 0, "what takes longer than it may is ended"
-    task = BackgroundTask("sleep", lambda task: task.run([sys.executable, "-c", "import time; time.sleep(60)"]))
-    task.start()
-    task.cancel()
-    assert follow(task, 2) == [Cancelled("sleep")]
+        (final,) = run(BackgroundTask("try", work))
+        assert final.problem.startswith(problem)
+    task = BackgroundTask("slow", lambda task: task.run(SLEEP, limit_s=0.2))
+    assert isinstance(run(task)[-1], Done) and task.result[0] != 0
+
+
+def test_a_command_is_heard_line_by_line_and_its_last_error_kept():
+    lines = []
+    code = "print('Error: one'); print('é'); print('error two'); print('end'); raise SystemExit(3)"
+    task = BackgroundTask("say", lambda task: task.run([sys.executable, "-X", "utf8", "-c", code], lines.append))
+    assert isinstance(run(task)[-1], Done) and task.result == (3, "error two")
+    assert lines == ["Error: one\n", "é\n", "error two\n", "end\n"]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows ends the command alone")
@@ -49,7 +42,7 @@ def test_a_cancel_ends_what_the_command_has_started(tmp_path):
     begins with."""
     late = tmp_path / "late"
     child = (
-        f"import time, pathlib; pathlib.Path({str(tmp_path / 'begun')!r}).touch(); time.sleep(1); "
+        f"import time, pathlib; pathlib.Path({str(tmp_path / 'begun')!r}).touch(); time.sleep(0.7); "
         f"pathlib.Path({str(late)!r}).touch()"
     )
     starter = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
@@ -59,17 +52,17 @@ def test_a_cancel_ends_what_the_command_has_started(tmp_path):
         time.sleep(0.02)
     task.cancel()
     assert follow(task, 2) == [Cancelled("venv")]
-    time.sleep(1.3)
+    time.sleep(1)
     assert not late.exists()
 
 
-def test_what_was_cancelled_does_nothing_more(tmp_path):
-    """It may be installed into the same folder meanwhile."""
+def test_what_was_cancelled_does_nothing_more():
+    """Another task may work in the same folder meanwhile."""
     going, done = threading.Event(), []
 
     def work(task: BackgroundTask) -> None:
         going.wait()
-        for step in (lambda: task.say(0, 1, "more"), lambda: task.run([sys.executable, "-c", ""])):
+        for step in (lambda: task.say(0, 1, "more"), lambda: task.run(SLEEP)):
             with contextlib.suppress(CancelledError):
                 step()
                 done.append(step)

@@ -51,31 +51,29 @@ colorspaces:
 """
 
 
-def install(profile: Path) -> Path:
-    """The built zip unpacked as an extension of a profile; its folder."""
-    subprocess.run(
-        [sys.executable, str(TOOL), "build", "--source-dir", str(ROOT), "--output-dir", str(profile)],
-        check=True,
-        capture_output=True,
-    )
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory) -> Path:
+    """The extension's zip."""
+    folder = tmp_path_factory.mktemp("zip")
+    build = [sys.executable, str(TOOL), "build", "--source-dir", str(ROOT), "--output-dir", str(folder)]
+    subprocess.run(build, check=True, capture_output=True)
+    return next(folder.glob("*.zip"))
+
+
+def install(archive: Path, profile: Path) -> Path:
+    """The zip unpacked as an extension of a profile; its folder."""
     folder = profile / "extensions" / "user_default" / "wildcap"
-    with zipfile.ZipFile(next(profile.glob("*.zip"))) as file:
+    with zipfile.ZipFile(archive) as file:
         file.extractall(folder)
     return folder
 
 
 def spend(profile: Path, *words: str, before: tuple[str, ...] = (), **environment: str) -> tuple[dict, str]:
     """What habits.py saw under these circumstances, and all that was printed."""
-    variables = {
-        **os.environ,
-        "BLENDER_USER_RESOURCES": str(profile),
-        "HOME": str(profile),
-        "PYTHONDONTWRITEBYTECODE": "1",
-        **environment,
-    }
+    own = {"BLENDER_USER_RESOURCES": str(profile), "HOME": str(profile), "PYTHONDONTWRITEBYTECODE": "1"}
     result = subprocess.run(
         [*before, sys.executable, str(ROOT / "tests" / "fixtures" / "habits.py"), *words],
-        env=variables,
+        env={**os.environ, **own, **environment},
         cwd=profile,
         capture_output=True,
         text=True,
@@ -95,11 +93,11 @@ def german(folder: Path) -> dict[str, str]:
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="a folder has no such mode here")
-def test_a_folder_that_cannot_be_written_to_a_name_in_other_letters_and_decimal_commas(tmp_path):
+def test_a_folder_that_cannot_be_written_to_a_name_in_other_letters_and_decimal_commas(archive, tmp_path):
     """Root ignores a folder's mode, so for root it is mounted."""
     profile = tmp_path / "Юзер 山田"
     profile.mkdir()
-    folder = install(profile)
+    folder = install(archive, profile)
     before: tuple[str, ...] = ()
     if os.geteuid():
         subprocess.run(["chmod", "-R", "a-w", str(folder)], check=True)
@@ -120,8 +118,8 @@ def test_a_folder_that_cannot_be_written_to_a_name_in_other_letters_and_decimal_
     assert seen["spaces"] == {"WildCap Albedo": "sRGB", "WildCap Specular": "Non-Color", "WildCap Normal": "Non-Color"}
 
 
-def test_a_studios_own_colour_configuration(tmp_path):
-    install(tmp_path)
+def test_a_studios_own_colour_configuration(archive, tmp_path):
+    install(archive, tmp_path)
     (tmp_path / "studio.ocio").write_text(CONFIGURATION, encoding="utf-8")
     seen, printed = spend(tmp_path, OCIO=str(tmp_path / "studio.ocio"))
     assert seen["spaces"] == {

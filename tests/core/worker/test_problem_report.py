@@ -59,14 +59,8 @@ def test_no_name_of_what_the_settings_name_elsewhere_is_left(capture, tmp_path):
     (tmp_path / "lights" / "Jane Doe evening.wildcap").mkdir(parents=True)
     (tmp_path / "lights" / "Jane Doe evening.wildcap" / "capture.json").write_text("{}")
     chosen = from_json({"registration": {"template": str(tmp_path / "heads" / "jane_doe_bust.obj")}})
-    capture.finish(
-        stages.by_name("registration"),
-        {"inputs": {}, "code": ""},
-        1.0,
-        chosen,
-        {"own_template": "jane_doe_bust"},
-        "0.2.0",
-    )
+    figures = {"own_template": "jane_doe_bust"}
+    capture.finish(stages.by_name("registration"), {"inputs": {}, "code": ""}, 1.0, chosen, figures, "0.2.0")
     write_job(capture, settings={"solve": {"together": str(tmp_path / "lights")}})
     scrub = Scrubber(ROOT, None, capture)
     assert scrub("the head jane_doe_bust.obj") == f"the head {REMOVED}"
@@ -83,14 +77,9 @@ def test_what_helps_stays(capture):
     )
     assert scrub(trace) == trace.replace(str(ROOT), "<WildCap>")
     assert scrub(f"{capture.root}/frames/00001.jpg cannot be read") == "<capture>/frames/00001.jpg cannot be read"
-    assert (
-        scrub("/opt/solver/lib/python3.11/site-packages/torch/x.py")
-        == "<solver>/lib/python3.11/site-packages/torch/x.py"
-    )
-    assert (
-        scrub("https://example.org/simple 12:30:05 2026-11-23 50% of 3/4")
-        == "https://example.org/simple 12:30:05 2026-11-23 50% of 3/4"
-    )
+    assert scrub("/opt/solver/lib/torch/x.py") == "<solver>/lib/torch/x.py"
+    plain = "https://example.org/simple 12:30:05 2026-11-23 50% of 3/4"
+    assert scrub(plain) == plain
 
 
 def test_the_zip_holds_logs_versions_settings_and_states_and_no_picture(capture, tmp_path, capsys, monkeypatch):
@@ -99,15 +88,8 @@ def test_the_zip_holds_logs_versions_settings_and_states_and_no_picture(capture,
     (capture.logs / "scan.log").write_text("\n".join(LINES), encoding="utf-8")
     (capture.logs / "mine.log").write_text("somebody else's")
     settings = {"registration": {"template": "/home/zoeann/geheim.obj"}, "solve": {"steps": 31}}
-    (capture.root / "job.json").write_text(
-        json.dumps(
-            {"capture": ".", "source": "", "from": None, "until": None, "quality": "standard", "settings": settings}
-        )
-    )
-    try:
-        raise ValueError("/home/zoeann/geheim")
-    except ValueError as error:
-        unforeseen.explain(error, "the trial")
+    (capture.root / "job.json").write_text(json.dumps({"capture": ".", "settings": settings}))
+    unforeseen.explain(ValueError("/home/zoeann/geheim"), "the trial")
     target = tmp_path / "report.zip"
     assert main(["report-problem", str(capture.root), "--to", str(target)]) == 0
     assert "Nothing was sent" in capsys.readouterr().out
@@ -123,7 +105,6 @@ def test_the_zip_holds_logs_versions_settings_and_states_and_no_picture(capture,
     assert "WC-" in texts["unforeseen.txt"] and "device cpu" in texts["doctor.txt"]
     assert main(["report-problem", "--to", str(target)]) == 2 and "already exists" in capsys.readouterr().err
     assert main(["report-problem", str(tmp_path / "none"), "--to", str(tmp_path / "b.zip")]) == 2
-    assert main(["status", str(tmp_path / "none")]) == 2 and "no capture at" in capsys.readouterr().err
 
 
 def test_a_capture_that_cannot_be_read_is_reported_on_all_the_same(capture, tmp_path):

@@ -44,12 +44,7 @@ def follow(jobs, until=lambda job: False, limit_s: float = 1800) -> float:
 
 
 def test_from_the_question_through_a_cancel_to_a_solve_and_removed_again(addon, solver):
-    jobs, install, problems, checking = (
-        addon("jobs"),
-        addon("setup.install"),
-        addon("problems"),
-        addon("setup.checking"),
-    )
+    jobs, install, problems, checking = map(addon, ("jobs", "setup.install", "problems", "setup.checking"))
     if not bpy.app.online_access and not WHEELS:
         pytest.skip("this Blender cannot go online")
     assert install.WILDCAP_OT_install_solver.tell() is None
@@ -81,13 +76,8 @@ def test_from_the_question_through_a_cancel_to_a_solve_and_removed_again(addon, 
     bpy.ops.wildcap.open_sample_head()
     item = bpy.context.scene.wildcap.captures[-1]
     item.quality = 'draft'
-    item.solve.size, item.solve.steps, item.upscale.size, item.transfer.size, item.transfer.scan = (
-        128,
-        6,
-        1024,
-        256,
-        False,
-    )
+    item.solve.size, item.solve.steps, item.upscale.size = 128, 6, 1024
+    item.transfer.size, item.transfer.scan = 256, False
     bpy.ops.wildcap.solve()
     solve_s = follow(jobs)
     capture = addon("captures").folder(item)
@@ -100,10 +90,8 @@ def test_from_the_question_through_a_cancel_to_a_solve_and_removed_again(addon, 
     remove_s = follow(jobs)
     assert not solver.exists() and addon("preferences").python() is None and problems.of("") is None
     print(*told, *freed, sep="\n")
+    print(f"{len(plan.packages)} packages, {plan.disk / 1e9:.2f} GB planned, {size / 1e9:.2f} GB on disk")
     print(
-        f"told {plan.disk / 1e9:.2f} GB on disk, found {size / 1e9:.2f} GB; {len(plan.packages)} packages; asked in "
-        f"{asking_s:.0f} s, cancelled in "
-        f"{cancel_s:.1f} s, installed and verified in {install_s:.0f} s, a draft solved in {solve_s:.0f} s, removed "
-        f"in {remove_s:.0f} s"
+        f"ask {asking_s:.0f}, cancel {cancel_s:.1f}, install {install_s:.0f}, solve {solve_s:.0f}, remove {remove_s:.0f} s"
     )
     assert size == pytest.approx(plan.disk, rel=0.2)

@@ -15,7 +15,9 @@ from core.__main__ import main
 from core.capture import consent
 from core.capture import switchlight_api as service
 from core.capture.capture import Capture
+from core.capture.messages import Done
 from core.worker.job import write_job
+from core.worker.runner import run_job
 from tests.fixtures.switchlight_capture import make
 from tests.fixtures.switchlight_server import KEY, Service
 
@@ -39,22 +41,10 @@ def capture(tmp_path):
     return capture
 
 
-def begin(command: list[str], server: Service, **more) -> subprocess.Popen:
-    environment = {
-        name: value
-        for name, value in os.environ.items()
-        if name not in (consent.GIVEN_VARIABLE, service.OFFLINE_VARIABLE)
-    }
-    environment |= {service.KEY_VARIABLE: KEY, service.BASE_VARIABLE: server.url, **more}
-    return subprocess.Popen(
-        command,
-        cwd=ROOT,
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        encoding="utf-8",
-    )
+def begin(job: Path, server: Service, **more) -> subprocess.Popen:
+    environment = {**os.environ, service.KEY_VARIABLE: KEY, service.BASE_VARIABLE: server.url, **more}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, "encoding": "utf-8"}
+    return subprocess.Popen([*JOB, str(job)], cwd=ROOT, env=environment, **pipes)
 
 
 def command_lines() -> list[bytes]:
@@ -68,10 +58,12 @@ def command_lines() -> list[bytes]:
     return found
 
 
-def test_killed_in_the_middle_and_continued_each_frame_is_paid_once_and_the_key_is_nowhere(capture):
+def test_killed_in_the_middle_and_continued_each_frame_is_paid_once_and_the_key_is_nowhere(capture, monkeypatch):
+    for name in (consent.GIVEN_VARIABLE, service.OFFLINE_VARIABLE):
+        monkeypatch.delenv(name, raising=False)
     job = write_job(capture, first="delight", last="delight", settings={"delight": {"delighter": "switchlight"}})
     with Service(["fine", "fine", "fine", *["hang"] * 3]) as server:
-        with begin([*JOB, str(job)], server, **consent.by_flag(capture)) as first:
+        with begin(job, server, **consent.by_flag(capture)) as first:
             end = time.monotonic() + 60
             while len(server.calls) < 6 or len(list(capture.switchlight.glob("[!.]*.png"))) < 3:
                 assert time.monotonic() < end and first.poll() is None, first.communicate()
@@ -81,9 +73,11 @@ def test_killed_in_the_middle_and_continued_each_frame_is_paid_once_and_the_key_
             said = first.communicate()[0]
         said += (capture.logs / "delight.log").read_text(encoding="utf-8")
         assert "6 credits" in said and sorted(server.charged.values()) == [1, 1, 1] and capture.lock.is_file()
-        with begin([*JOB, str(job)], server) as second:
-            said += second.communicate(timeout=120)[0] + (capture.logs / "delight.log").read_text(encoding="utf-8")
-        assert "Done(" in said, said
+        for name, value in (("KEY_VARIABLE", KEY), ("BASE_VARIABLE", server.url)):
+            monkeypatch.setenv(getattr(service, name), value)
+        messages: list = []
+        assert isinstance(run_job(job, messages.append), Done), messages
+        said += f"{messages} {(capture.logs / 'delight.log').read_text(encoding='utf-8')}"
         assert len(server.charged) == 6 and set(server.charged.values()) == {1}, (
             "and the consent holds for what is left"
         )

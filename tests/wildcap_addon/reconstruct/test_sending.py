@@ -130,7 +130,7 @@ def test_what_cannot_or_need_not_be_agreed_to_is_refused(addon, item, capture, w
     refuses("nothing to send", allow)
     (capture / "frames" / "frames.json").unlink()
     assert "it stops then, and asks" in words()
-    refuses("no frames yet", allow)
+    refuses("no frames to send yet", allow)
 
 
 def test_the_key_is_told_to_the_worker_of_that_delighter_alone(addon, item, capture, monkeypatch, tmp_path):
