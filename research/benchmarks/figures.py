@@ -41,7 +41,7 @@ class Figures(dict):
 
 
 def write_record(path: Path, benchmark: str, command: str, figures: dict, keep: bool = False) -> None:
-    """Writes a record, with the commit (HEAD's, None outside of git), the day and the machine.
+    """Write a record, with the commit (HEAD's, None outside of git), the day and the machine.
 
     path: of the JSON file; benchmark: the module's name; command: as the docs have it, folders as CAPITALS; figures:
     nested; keep: figures of a record that is there stay where they were not measured anew, as of other captures or
@@ -57,8 +57,8 @@ def write_record(path: Path, benchmark: str, command: str, figures: dict, keep: 
 
 
 def read_record(name: str, folder: Path = PUBLISHED) -> dict:
-    """The record `name` of a folder; "date" and "machine" are None in older ones. Raises Problem where it is missing or
-    is no record."""
+    """Return the record `name` of a folder; "date" and "machine" are None in older ones. Raises Problem where it is
+    missing or is no record."""
     path = Path(folder) / f"{name}.json"
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
@@ -90,7 +90,7 @@ def layout(record: dict, indent: int = 0) -> str:
 
 
 def markdown(head: list[str], rows: list[list]) -> str:
-    """A Markdown table, without a newline at its end; None is a dash."""
+    """Return a Markdown table, without a newline at its end; None is a dash."""
     return "\n".join(
         "| " + " | ".join("-" if cell is None else str(cell) for cell in row) + " |"
         for row in (head, ["---"] * len(head), *rows)
@@ -98,7 +98,7 @@ def markdown(head: list[str], rows: list[list]) -> str:
 
 
 def number(value: float | None, digits: int, unit: str = "") -> str | None:
-    """What a table's cell says of a figure; None, which is a dash there, of one that was not measured."""
+    """Return what a table's cell says of a figure; None, which is a dash there, of one that was not measured."""
     return None if value is None else f"{value:.{digits}f}{unit}"
 
 
@@ -139,7 +139,7 @@ def commit() -> str | None:
 
 
 def machine() -> dict:
-    """The processor's name, its cores, and the memory in GB; None where the system does not say it."""
+    """Return the processor's name, its cores, and the memory in GB; None where the system does not say it."""
     try:
         told = Path("/proc/cpuinfo").read_text(encoding="utf-8")
         name = next(line.partition(":")[2].strip() for line in told.splitlines() if line.startswith("model name"))
@@ -150,7 +150,7 @@ def machine() -> dict:
 
 
 def machine_line() -> str:
-    """The same in words."""
+    """Return the same in words."""
     here = machine()
     memory = f", {here['memory_gb']} GB" if here["memory_gb"] else ""
     return f"{here['cores']} cores ({here['processor'] or 'unknown processor'}){memory}"

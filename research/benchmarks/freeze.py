@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps what a solve begins with, of many captures, as one version of the code made it: so that a new solver is judged
+"""Keep what a solve begins with, of many captures, as one version of the code made it: so that a new solver is judged
 on the old delighter's textures.
 
     python -m research.benchmarks.freeze FOLDER OUT [--only PREFIX ...]     keeps NAME.wildcap of FOLDER as
@@ -52,16 +52,16 @@ def main() -> int:
     parser.add_argument("out", type=Path)
     parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
     parser.add_argument("--check", action="store_true", help="compare OUT with its record instead")
-    asked = parser.parse_args()
-    out = asked.out.resolve()
+    options = parser.parse_args()
+    out = options.out.resolve()
     try:
-        if asked.check:
+        if options.check:
             wrong = differences(out)
             print("\n".join(wrong) or f"{len(read_record(out))} captures are as they were kept.")
-        elif asked.folder is None:
+        elif options.folder is None:
             parser.error("Name the folder of captures and the one to keep them in.")
         else:
-            wrong = freeze(asked.folder.resolve(), out, tuple(asked.only))
+            wrong = freeze(options.folder.resolve(), out, tuple(options.only))
     except Problem as problem:
         print(problem, file=sys.stderr)
         return 1
@@ -69,7 +69,7 @@ def main() -> int:
 
 
 def freeze(folder: Path, out: Path, only: tuple[str, ...] = ("",)) -> list[str]:
-    """Keeps the captures of a folder that have a texture; the names of those that were kept before and have changed
+    """Keep the captures of a folder that have a texture; the names of those that were kept before and have changed
     since.
 
     Raises Problem where `out` lies in the repository, or nothing is there to keep.
@@ -107,7 +107,7 @@ def freeze(folder: Path, out: Path, only: tuple[str, ...] = ("",)) -> list[str]:
 
 
 def differences(out: Path) -> list[str]:
-    """What is not as the record of a folder has it, a line each."""
+    """Return what is not as the record of a folder has it, a line each."""
     found = []
     for name, kept in read_record(out).items():
         root = out / f"{name}.wildcap"
@@ -122,7 +122,7 @@ def differences(out: Path) -> list[str]:
 
 
 def inputs(root: Path) -> list[str]:
-    """The files of a capture that are kept, relative to it."""
+    """Return the files of a capture that are kept, relative to it."""
     inside = [
         path
         for folder in FOLDERS

@@ -39,7 +39,7 @@ def main() -> None:
 
 
 def take_inventory() -> dict:
-    """Every name, by what it is a name of; lists are in order of name where their order means nothing."""
+    """Return every name, by what it is a name of; lists are in order of name where their order means nothing."""
     addon = [ast.parse(path.read_text(encoding="utf-8")) for path in sorted((ROOT / "wildcap_addon").rglob("*.py"))]
     return {
         "stages": {stage.name: [*stage.reads, "->", *stage.writes] for stage in stages.STAGES},
@@ -64,7 +64,7 @@ def _describe(field) -> str:
 
 
 def _figures() -> list[str]:
-    """The names that stages and tools leave in capture.json, where they are written as text."""
+    """Return the names that stages and tools leave in capture.json, where they are written as text."""
     calls = (
         node
         for path in (ROOT / "core").rglob("*.py")
@@ -117,7 +117,7 @@ def _saved_names(tree: ast.Module):
 
 
 def _zip_files() -> list[str]:
-    """The tracked files that the manifest does not exclude from the extension."""
+    """Return the tracked files that the manifest does not exclude from the extension."""
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
     with tempfile.NamedTemporaryFile("w", suffix=".txt") as patterns:
         patterns.write("\n".join(manifest["build"]["paths_exclude_pattern"]))

@@ -71,8 +71,8 @@ def is_cuda(wheel: Wheel, need: Requirement) -> bool:
 
 
 def ask(name: str, packages: list[str], *more: str) -> dict[str, Wheel]:
-    """The wheels that pip chooses for a lock's platform and Python, without what they need in turn. Raises Problem
-    where one is not to be had."""
+    """Return the wheels that pip chooses for a lock's platform and Python, without what they need in turn. Raises
+    Problem where one is not to be had."""
     with tempfile.TemporaryDirectory(prefix="wildcap_lock_") as folder:
         report = Path(folder) / "report.json"
         command = [
@@ -115,7 +115,7 @@ def ask(name: str, packages: list[str], *more: str) -> dict[str, Wheel]:
 
 
 def environment_of(name: str) -> dict[str, str]:
-    """What a requirement's conditions are judged by (PEP 508)."""
+    """Return what a requirement's conditions are judged by (PEP 508)."""
     platform, _, python = name.rpartition("-")
     system, short, machine, kind = {
         "win_amd64": ("Windows", "win32", "AMD64", "nt"),

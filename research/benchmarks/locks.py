@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes requirements/locks: every package of the solver for each platform and Python, pinned, with the hash of its
+"""Write requirements/locks: every package of the solver for each platform and Python, pinned, with the hash of its
 wheel, its bytes to download and its bytes on disk.
 
     python -m research.benchmarks.locks [NAME ...]      NAME as win_amd64-3.13; all of them without one
@@ -40,7 +40,7 @@ COMPILED = 1.25
 
 
 def write(name: str) -> None:
-    """Writes one lock and what lies beside it. Raises Problem where a package is not to be had."""
+    """Write one lock and what lies beside it. Raises Problem where a package is not to be had."""
     direct = [
         line.partition("#")[0].strip()
         for line in (REQUIREMENTS / "worker.txt").read_text(encoding="utf-8").splitlines()
@@ -60,8 +60,8 @@ def write(name: str) -> None:
 
 
 def _packages(name: str, wheels: dict[str, Wheel], torch: str = "") -> list[str]:
-    """The longest path of all, then the packages, with their sizes; `torch` is the hash of a build of PyTorch that is
-    taken as well."""
+    """Return the longest path of all, then the packages, with their sizes; `torch` is the hash of a build of PyTorch
+    that is taken as well."""
     files = {other: lock_resolver.wheel_files(wheel.url) for other, wheel in wheels.items()}
     longest = max(
         (path for _, listed in files.values() for file, _ in listed for path in installed_paths(file, name)), key=len
@@ -98,7 +98,7 @@ def _write_pip(name: str) -> None:
 
 
 def installed_paths(file: str, name: str) -> list[str]:
-    """Where a file of a wheel comes to lie below the environment's folder, the compiled one of a module and its
+    """Return where a file of a wheel comes to lie below the environment's folder, the compiled one of a module and its
     temporary name among them."""
     platform, _, python = name.rpartition("-")
     inside, scripts = (
@@ -142,8 +142,8 @@ def _own_build(name: str, version: str, build: str, local: Wheel, compute: str) 
 
 
 def _linux_size(name: str, compute: str) -> tuple[int, int]:
-    """The size of the index's build for Linux, with CUDA's libraries where it is for CUDA: other systems' builds have
-    them within."""
+    """Return the size of the index's build for Linux, with CUDA's libraries where it is for CUDA: other systems' builds
+    have them within."""
     linux = f"manylinux_x86_64-{name.rpartition('-')[2]}"
     known = [size for pinned, size in locks.read(REQUIREMENTS, linux).sizes.items() if pinned.startswith("torch==")]
     if compute == "cuda":

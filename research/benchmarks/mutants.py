@@ -69,19 +69,19 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--limit", type=int, default=60, help="tests that are run for one fault at most")
-    asked = parser.parse_args()
-    if asked.step == "draw":
-        write_json(asked.record, {"seed": asked.seed, "mutants": draw(asked.count, asked.seed)})
+    options = parser.parse_args()
+    if options.step == "draw":
+        write_json(options.record, {"seed": options.seed, "mutants": draw(options.count, options.seed)})
         return
-    record = json.loads(asked.record.read_text(encoding="utf-8"))
+    record = json.loads(options.record.read_text(encoding="utf-8"))
     with tempfile.TemporaryDirectory(prefix="mutants_") as folder:
         tree = Path(folder) / "tree"
         copy_tree(tree)
-        if asked.step == "trace":
+        if options.step == "trace":
             trace(record["mutants"], tree)
         else:
-            run(record["mutants"], tree, asked.limit, lambda: write_json(asked.record, record))
-    write_json(asked.record, record)
+            run(record["mutants"], tree, options.limit, lambda: write_json(options.record, record))
+    write_json(options.record, record)
 
 
 def draw(count: int, seed: int) -> list[dict]:
@@ -114,7 +114,7 @@ def functions_of(tree: ast.AST, within: str = "") -> Iterator[tuple[str, ast.Fun
 
 
 def sites_of(function: ast.FunctionDef) -> list[ast.AST]:
-    """The nodes of a function's own body that a fault can be put into, in a fixed order."""
+    """Return the nodes of a function's own body that a fault can be put into, in a fixed order."""
     found = []
     waiting = list(reversed(function.body))
     while waiting:
@@ -132,7 +132,7 @@ def sites_of(function: ast.FunctionDef) -> list[ast.AST]:
 
 
 def put_fault(text: str, mutant: dict) -> str:
-    """The source with the fault in it. Raises LookupError where the function has no such place any more."""
+    """Return the source with the fault in it. Raises LookupError where the function has no such place any more."""
     tree = ast.parse(text)
     function = next((node for name, node in functions_of(tree) if name == mutant["function"]), None)
     sites = sites_of(function) if function is not None else []
@@ -151,7 +151,7 @@ def put_fault(text: str, mutant: dict) -> str:
 
 
 def copy_tree(to: Path) -> None:
-    """Copies what git knows, as it is on the disk."""
+    """Copy what git knows, as it is on the disk."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     for name in filter(None, listed.split("\0")):
         if (ROOT / name).is_file():
@@ -188,7 +188,7 @@ def trace(mutants: list[dict], tree: Path) -> None:
 
 
 def _opens_a_file(node: ast.stmt) -> bool:
-    """Whether it has to stay before all else: the module's docstring, or an import from __future__."""
+    """Return whether it has to stay before all else: the module's docstring, or an import from __future__."""
     docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
     return docstring or (isinstance(node, ast.ImportFrom) and node.module == "__future__")
 
@@ -208,7 +208,7 @@ def run(mutants: list[dict], tree: Path, limit: int, keep) -> None:
 
 
 def _nearest(mutant: dict) -> list[str]:
-    """The tests that enter its function, those first whose file shares a word with the fault's."""
+    """Return the tests that enter its function, those first whose file shares a word with the fault's."""
     words = set(Path(mutant["file"]).with_suffix("").as_posix().replace("/", "_").split("_"))
     return sorted(
         mutant["entered_by"], key=lambda test: -len(words & set(Path(test.split("::")[0]).stem.split("_")[1:]))

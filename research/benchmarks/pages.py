@@ -24,7 +24,7 @@ Sections = list[tuple[str, str]]
 
 
 def write_page(path: Path, title: str, command: str, sections: Sections) -> None:
-    """Writes the page of a benchmark that has just run.
+    """Write the page of a benchmark that has just run.
 
     path: of the Markdown file; title: of the page; command: that made the figures; sections: of the page."""
     today = datetime.date.today().isoformat()
@@ -33,7 +33,7 @@ def write_page(path: Path, title: str, command: str, sections: Sections) -> None
 
 
 def page_text(title: str, records: list[dict], sections: Sections) -> str:
-    """The page in Markdown; of `records` (research/benchmarks/figures.py) it tells how they were made."""
+    """Return the page in Markdown; of `records` (research/benchmarks/figures.py) it tells how they were made."""
     text = [MADE, f"# {title}", *([made_by(records)] if records else [])]
     for heading, body in sections:
         text += [f"## {heading}"] * bool(heading) + [body]
@@ -56,7 +56,7 @@ def prose(*paragraphs: str) -> str:
 
 
 def reflow(block: str) -> str:
-    """A paragraph, or a list, in lines of at most WIDTH; tables, pictures, headings and code as they are."""
+    """Return a paragraph, or a list, in lines of at most WIDTH; tables, pictures, headings and code as they are."""
     if block.startswith(("|", "!", "#", "<", " ")):
         return block
     items = re.split(r"\n(?=- )", block)
@@ -73,7 +73,7 @@ def reflow(block: str) -> str:
 
 
 def replace_text(path: Path, text: str) -> None:
-    """Replaces a text whose content changed, at once."""
+    """Replace a text whose content changed, at once."""
     if not path.is_file() or path.read_text(encoding="utf-8") != text:
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as temporary:

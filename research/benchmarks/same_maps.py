@@ -48,7 +48,7 @@ def main() -> int:
 
 
 def same_pixels(first: Path, second: Path) -> bool:
-    """Whether two PNG files that are packed differently hold the same values."""
+    """Return whether two PNG files that are packed differently hold the same values."""
     if first.suffix != ".png" or not (first.is_file() and second.is_file()):
         return False
     return images.bits(first) == images.bits(second) and np.array_equal(
@@ -57,7 +57,7 @@ def same_pixels(first: Path, second: Path) -> bool:
 
 
 def written(capture: Capture, stage: stages.Stage) -> dict[str, str]:
-    """The files that a stage wrote: name relative to the capture -> content hash."""
+    """Return the files that a stage wrote: name relative to the capture -> content hash."""
     found = {}
     for name in stage.writes:
         told = hash_tree(capture.root / name)

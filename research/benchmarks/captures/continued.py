@@ -14,7 +14,7 @@ from core.settings.settings import Settings
 
 
 def begin_at_delight(source: Capture, folder: Path) -> Capture:
-    """A capture in place of whatever is in the folder: the frames, cameras and head of another one, no more."""
+    """Return a capture in place of whatever is in the folder: the frames, cameras and head of another one, no more."""
     shutil.rmtree(folder, ignore_errors=True)
     begun = Capture(folder)
     for part in (source.frames, source.cameras):
@@ -24,6 +24,6 @@ def begin_at_delight(source: Capture, folder: Path) -> Capture:
 
 
 def run_stages(capture: Capture, settings: Settings, *stages: str) -> None:
-    """Runs these stages, whether they are fresh or not; nothing is written to the capture's record."""
+    """Run these stages, whether they are fresh or not; nothing is written to the capture's record."""
     for stage in stages:
         importlib.import_module(f"core.stages.{stage}").run(capture, settings, Reporter(stage))

@@ -36,7 +36,7 @@ EMPTY = np.zeros((64, 64), np.float32)
 
 
 def flash(source: Capture, work: Capture, settings: Settings) -> Capture:
-    """The dark room's capture up to its texture, with an empty mask; made once."""
+    """Return the dark room's capture up to its texture, with an empty mask; made once."""
     if not work.texture_confidence.is_file():
         begin_at_delight(source, work.root)
         write_delit(work, work.root / "without_lamp")
@@ -47,8 +47,8 @@ def flash(source: Capture, work: Capture, settings: Settings) -> Capture:
 
 
 def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict]:
-    """The solver's albedo, sRGB [S, S, 3], where the light is known and gone: even, one colour, held throughout; and
-    the seconds."""
+    """Return the solver's albedo, sRGB [S, S, 3], where the light is known and gone: even, one colour, held throughout;
+    and the seconds."""
     began, prior = time.monotonic(), _prior()
     recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0, linear=0.0)
     evidence = read_evidence(capture, read_head(capture), settings.solve.size)
@@ -67,7 +67,7 @@ def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, 
 
 
 def studio(source: Capture, work: Capture, settings: Settings) -> Capture:
-    """The studio's capture up to the proposed mask; the mask that counts is empty. Made once."""
+    """Return the studio's capture up to the proposed mask; the mask that counts is empty. Made once."""
     if not work.shadow_mask.is_file():
         begin_at_delight(source, work.root)
         run_stages(work, from_json({"delight": {"delighter": "none"}}, settings), "delight", "texture", "shadow_mask")
@@ -76,8 +76,8 @@ def studio(source: Capture, work: Capture, settings: Settings) -> Capture:
 
 
 def by_the_stage(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict]:
-    """The solve stage's albedo, sRGB [S, S, 3]; its seconds, and the share of the seen face that the proposed mask
-    would have covered, in percent."""
+    """Return the solve stage's albedo, sRGB [S, S, 3]; its seconds, and the share of the seen face that the proposed
+    mask would have covered, in percent."""
     began = time.monotonic()
     run_stages(capture, from_json({"delight": {"delighter": "none"}}, settings), "solve")
     seconds, proposed = time.monotonic() - began, images.read_mask(capture.shadow_mask_auto)
@@ -99,7 +99,7 @@ def use_true_frames(source: Capture, truth: Path, work: Capture, settings: Setti
 
 
 def as_albedo(capture: Capture, settings: Settings) -> np.ndarray:
-    """The texture whose confident facial skin has been brought to the skin tone, sRGB [S, S, 3]."""
+    """Return the texture whose confident facial skin has been brought to the skin tone, sRGB [S, S, 3]."""
     texture = images.read_linear(capture.texture)
     tone = np.array(read_given_tone(settings.solve.skin_tone).linear, np.float32)
     skin = images.read_data(capture.texture_confidence)[..., 0] * template.mask("skin", len(texture))

@@ -49,13 +49,13 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", type=int, nargs="+", choices=list(EYES), default=list(EYES))
     parser.add_argument("--facekit", type=Path, help="ICT-FaceKit's folder: without it they are other heads")
-    asked = parser.parse_args()
-    for seed in asked.only:
-        photograph_person(asked.folder.resolve(), seed, EYES[seed], asked.facekit)
+    options = parser.parse_args()
+    for seed in options.only:
+        photograph_person(options.folder.resolve(), seed, EYES[seed], options.facekit)
 
 
 def photograph_person(folder: Path, seed: int, kind: str, facekit: Path | None) -> None:
-    """Makes one person's capture, if it is not there.
+    """Make one person's capture, if it is not there.
 
     folder: takes SEED.wildcap, and what was rendered for it; seed: of the person; kind: of the light, a key of
     people_lights.KINDS; facekit: ICT-FaceKit's folder, of which heads are derived, too; None: other heads."""

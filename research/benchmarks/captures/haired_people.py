@@ -31,7 +31,7 @@ SIZE = 1024
 
 
 def photograph(folder: Path, figure: Figure) -> tuple[list[View], list[np.ndarray]]:
-    """The views, with pictures in `folder`, and the albedo as each of them sees it, linear [H, W, 3]."""
+    """Return the views, with pictures in `folder`, and the albedo as each of them sees it, linear [H, W, 3]."""
     world, seed = None, figure.person.seed
     rng, taken = np.random.default_rng([seed, 91]), phone.sample_phone(seed)
     lamp = np.array([rng.uniform(-1, 1), -1, rng.uniform(0.2, 1)])
@@ -69,8 +69,8 @@ def _look(world: Scene, view: View) -> tuple[np.ndarray, np.ndarray]:
 
 
 def read_maps(figure: Figure, views: list[View], colours: list[np.ndarray]) -> tuple[HeadMaps, PartsShown]:
-    """The texture that the true albedo of the views makes, as maps (what none of them sees has the bare skin's), and
-    what the parser says of the views."""
+    """Return the texture that the true albedo of the views makes, as maps (what none of them sees has the bare skin's),
+    and what the parser says of the views."""
     surface = Head(figure.head).unfold(SIZE)
     total, weights = np.zeros((SIZE, SIZE, 3)), np.zeros((SIZE, SIZE, 1))
     looks = [observe(view, hold(colour), surface, 1.0) for view, colour in zip(views, colours, strict=True)]

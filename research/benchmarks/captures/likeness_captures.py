@@ -38,7 +38,7 @@ PACE = 6
 def film_person(
     folder: Path, name: str, figure: Figure, light: scene.SceneLight, description: str, frames: int, room: bool
 ) -> Capture:
-    """Films a person, if the files are not there, and prints the minutes.
+    """Film a person, if the files are not there, and print the minutes.
 
     folder: takes NAME, the truth with the video, and NAME.wildcap, the capture; name: of the capture; figure: the
     person; light: filmed in; description: of the light, for the record; frames: of the video; room: whether one is
@@ -169,8 +169,8 @@ def _write_record(
 
 
 def uv_parts(figure: Figure) -> dict[str, np.ndarray]:
-    """Where each part is on the head's own map, [S, S] in [0, 1]: the growths as dense as they root, eyes as the lids
-    cover them, skin is the face's rest."""
+    """Return where each part is on the head's own map, [S, S] in [0, 1]: the growths as dense as they root, eyes as the
+    lids cover them, skin is the face's rest."""
     parts = {name: template.mask(name, 1024) for name in ("lips", "eyes", "skin")}
     parts |= {name: images.resize(where, 1024, 1024) for name, where in figure.growth.items()}
     for name in figure.growth:
@@ -179,7 +179,7 @@ def uv_parts(figure: Figure) -> dict[str, np.ndarray]:
 
 
 def _flows(figure: Figure, cameras: np.ndarray, poses: np.ndarray) -> list[np.ndarray]:
-    """How far each pixel moves in one frame's time of the film, [H, W, 2] of each frame, in pixels."""
+    """Return how far each pixel moves in one frame's time of the film, [H, W, 2] of each frame, in pixels."""
     caster, views = raster.RayCaster(figure.head), [sample.view_of(matrix, SCALE) for matrix in cameras]
     flows = []
     for k in range(len(views)):
@@ -192,7 +192,7 @@ def _flows(figure: Figure, cameras: np.ndarray, poses: np.ndarray) -> list[np.nd
 def _developed(
     work: Path, count: int, faces: dict, flows: list[np.ndarray], camera: phone.Phone, seed: int
 ) -> Iterator[np.ndarray]:
-    """The frames as the phone shows them, sRGB [H, W, 3]."""
+    """Return the frames as the phone shows them, sRGB [H, W, 3]."""
     gain = exposure({frame: images.read_linear(work / f"{frame:05d}.exr") for frame in faces}, faces)
     for frame in range(count):
         linear = images.read_linear(work / f"{frame:05d}.exr").astype(np.float32)

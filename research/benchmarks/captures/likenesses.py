@@ -75,20 +75,20 @@ def main() -> None:
     parser.add_argument("--lights", nargs="+", choices=("own", *LIGHTS), default=("own", *LIGHTS))
     parser.add_argument("--facekit", type=Path)
     parser.add_argument("--sheet", type=Path, help="render a contact sheet of the four people instead")
-    asked = parser.parse_args()
-    folder = asked.folder.resolve()
-    if asked.sheet:
-        write_sheet(asked.sheet, [person.seed for person in LIKENESSES], folder / "sheet", asked.facekit)
+    options = parser.parse_args()
+    folder = options.folder.resolve()
+    if options.sheet:
+        write_sheet(options.sheet, [person.seed for person in LIKENESSES], folder / "sheet", options.facekit)
         return
-    for person in (each for each in (*LIKENESSES, *HELD_BACK) if each.name in asked.only):
-        film_likeness(person, folder, asked.lights, asked.facekit)
-    for person in (each for each in people.PEOPLE if each.name in asked.only):
-        for light in (light for light in LIGHTS if light in asked.lights):
+    for person in (each for each in (*LIKENESSES, *HELD_BACK) if each.name in options.only):
+        film_likeness(person, folder, options.lights, options.facekit)
+    for person in (each for each in people.PEOPLE if each.name in options.only):
+        for light in (light for light in LIGHTS if light in options.lights):
             photograph_again(person, folder, light)
 
 
 def film_likeness(person: Likeness, folder: Path, lights: list[str], facekit: Path | None) -> None:
-    """Films a person in each of the lights.
+    """Film a person in each of the lights.
 
     person: whose own light is among them; folder: as `film_person` has it; lights: "own", and keys of LIGHTS; facekit:
     ICT-FaceKit's folder, of which heads are derived, too; None: other heads."""

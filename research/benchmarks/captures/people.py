@@ -90,7 +90,7 @@ def main() -> None:
 
 
 def make(person: FilmedPerson, folder: Path, place: str = "wild") -> Capture:
-    """The person's capture and truth, made if they are not there."""
+    """Return the person's capture and truth, made if they are not there."""
     name = person.name if place == "wild" else f"{person.name}_{place}"
     capture, truth = Capture(folder / f"{name}.wildcap"), folder / name
     if (truth / "skin_tone.txt").exists():  # written last
@@ -143,7 +143,7 @@ def make(person: FilmedPerson, folder: Path, place: str = "wild") -> Capture:
 
 
 def _set(person: FilmedPerson, place: str) -> tuple[scene.SceneLight, np.ndarray]:
-    """The light at a place, and its cameras, camera-to-world [N, 4, 4]."""
+    """Return the light at a place, and its cameras, camera-to-world [N, 4, 4]."""
     if place == "studio":
         return scene.SceneLight((1.0, 1.0, 1.0)), scene.rig()
     path = scene.camera_path(person.seed, FRAMES)
@@ -161,7 +161,7 @@ def write_maps(folder: Path, skin: Skin) -> None:
 
 
 def solve_person(capture: Capture, truth: Path, until: str, quality: str) -> None:
-    """Runs the chain from delight on, from the scan on where there is no head, as the worker would, as far as it is not
+    """Run the chain from delight on, from the scan on where there is no head, as the worker would, as far as it is not
     fresh.
 
     capture: with frames and cameras; truth: folder with the skin's true tone, which is given; until: the last stage;
@@ -180,7 +180,7 @@ def solve_person(capture: Capture, truth: Path, until: str, quality: str) -> Non
 
 
 def skin_tone(truth: Path) -> str:
-    """The true skin tone as the command line takes it: sRGB R,G,B."""
+    """Return the true skin tone as the command line takes it: sRGB R,G,B."""
     return (truth / "skin_tone.txt").read_text(encoding="ascii").split("#")[0].replace(" ", "").strip()
 
 
@@ -199,8 +199,8 @@ def _write_truth(
 def _developed(
     work: Path, count: int, faces: dict[int, tuple[np.ndarray, np.ndarray]], seed: int
 ) -> Iterator[np.ndarray]:
-    """The rendered frames as a phone would show them, sRGB [H, W, 3]; `faces`: per frame with truth its albedo [H, W,
-    3] and facial skin [H, W]."""
+    """Return the rendered frames as a phone would show them, sRGB [H, W, 3]; `faces`: per frame with truth its albedo
+    [H, W, 3] and facial skin [H, W]."""
     gain = exposure({frame: images.read_linear(work / f"{frame:05d}.exr") for frame in faces}, faces)
     for frame in range(count):
         rng = np.random.default_rng([seed, 51, frame])

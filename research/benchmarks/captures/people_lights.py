@@ -26,12 +26,13 @@ def noon(seed: int) -> SceneLight:
 
 
 def overcast(seed: int) -> SceneLight:
-    """A sky thrice as bright above as at the horizon (CIE, Moon and Spencer 1942) over pavement."""
+    """Return a sky thrice as bright above as at the horizon (CIE, Moon and Spencer 1942) over pavement."""
     return SceneLight(panorama((1.2, 1.25, 1.3), (0.4, 0.417, 0.433), (0.14, 0.135, 0.13)))
 
 
 def window_bars(seed: int) -> SceneLight:
-    """A low sun through a window's bars into a dim room; the window's sky lights that side of the face softly."""
+    """Return a low sun through a window's bars into a dim room; the window's sky lights that side of the face
+    softly."""
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
     sun = Sun(_towards(38 * side, 24), 3.4, 0.0093, (1.0, 0.9, 0.74))
     window = _patch(panorama(ROOM, ROOM, (0.07, 0.05, 0.04)), _towards(60 * side, 18), 34, (1.5, 1.75, 2.1))
@@ -39,7 +40,7 @@ def window_bars(seed: int) -> SceneLight:
 
 
 def mixed_lamps(seed: int) -> SceneLight:
-    """An evening at home: a warm bulb on one side, a cool screen on the other, a ceiling lamp."""
+    """Return an evening at home: a warm bulb on one side, a cool screen on the other, a ceiling lamp."""
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
     return SceneLight(
         panorama((0.030, 0.024, 0.018), (0.03, 0.024, 0.018), (0.018, 0.012, 0.008)),
@@ -52,7 +53,7 @@ def mixed_lamps(seed: int) -> SceneLight:
 
 
 def haze(seed: int) -> SceneLight:
-    """A sun behind thin cloud, soft and from the side: the head's own shadow and no other."""
+    """Return a sun behind thin cloud, soft and from the side: the head's own shadow and no other."""
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
     return SceneLight(
         panorama((0.55, 0.62, 0.75), (0.75, 0.72, 0.68), (0.16, 0.14, 0.11)),
@@ -61,7 +62,8 @@ def haze(seed: int) -> SceneLight:
 
 
 def lamp_below(seed: int) -> SceneLight:
-    """A lamp on a table below the face, in a dim room: shading upside down, shadows that rise from nose and lips."""
+    """Return a lamp on a table below the face, in a dim room: shading upside down, shadows that rise from nose and
+    lips."""
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
     return SceneLight(
         panorama((0.035, 0.034, 0.033), (0.04, 0.038, 0.035), (0.06, 0.045, 0.03)),
@@ -90,7 +92,7 @@ def panorama(zenith, horizon, ground) -> np.ndarray:
 def make_bars(
     direction: np.ndarray, distance: float = 0.6, period: float = 0.085, width: float = 0.024, reach: float = 0.25
 ) -> Mesh:
-    """A window's upright and level bars between the head and the light, in a plane across it.
+    """Return a window's upright and level bars between the head and the light, in a plane across it.
 
     direction: [3], unit, where the light comes from; distance: of the plane from the head, in metres; period: of the
     upright bars, in metres; level ones have 1.6 of it; width: of a bar, in metres; reach: half a side of the plane, in
@@ -111,7 +113,7 @@ def make_bars(
 
 
 def _patch(picture: np.ndarray, towards: np.ndarray, width_deg: float, radiance: tuple) -> np.ndarray:
-    """A panorama with a window in a direction, its sides a fifth as soft as it is wide."""
+    """Return a panorama with a window in a direction, its sides a fifth as soft as it is wide."""
     near = np.degrees(np.arccos(np.clip(_directions() @ towards, -1, 1)))
     share = np.clip((width_deg / 2 - near) / (0.2 * width_deg) + 0.5, 0, 1)[..., None]
     return (picture * (1 - share) + np.asarray(radiance) * share).astype(np.float32)
@@ -128,6 +130,6 @@ def _directions() -> np.ndarray:
 
 
 def _towards(azimuth_deg: float, height_deg: float) -> np.ndarray:
-    """A unit direction: azimuth 0 is straight before the face, positive on the person's left."""
+    """Return a unit direction: azimuth 0 is straight before the face, positive on the person's left."""
     a, h = np.radians([azimuth_deg, height_deg])
     return np.array([np.sin(a) * np.cos(h), -np.cos(a) * np.cos(h), np.sin(h)])

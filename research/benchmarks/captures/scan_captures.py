@@ -62,19 +62,19 @@ def main() -> None:
     parser.add_argument("data", type=Path)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--lights", nargs="+", choices=LIGHTS, default=list(LIGHTS))
-    asked = parser.parse_args()
-    missing = [name for name in NEEDED if not (asked.data / name).exists()]
+    options = parser.parse_args()
+    missing = [name for name in NEEDED if not (options.data / name).exists()]
     if missing:
         raise SystemExit(
-            f"{asked.data} holds no head scan: {', '.join(missing)} is missing. Name the folder that has "
+            f"{options.data} holds no head scan: {', '.join(missing)} is missing. Name the folder that has "
             "lee_perry_smith and lps_sun."
         )
-    for light in asked.lights:
-        photograph(asked.data, asked.folder.resolve(), light)
+    for light in options.lights:
+        photograph(options.data, options.folder.resolve(), light)
 
 
 def photograph(data: Path, folder: Path, name: str) -> Capture:
-    """The capture and truth of one light, made if they are not there; prints the minutes."""
+    """Return the capture and truth of one light, made if they are not there; prints the minutes."""
     target, capture = folder / f"scan_{name}", Capture(folder / f"scan_{name}.wildcap")
     if (target / "skin_tone.txt").exists():  # written last
         return capture
@@ -128,7 +128,7 @@ def photograph(data: Path, folder: Path, name: str) -> Capture:
 
 
 def read_scan(data: Path) -> Mesh:
-    """The scan in metres, +Z up, face towards -Y, the middle between the pupils at the origin."""
+    """Return the scan in metres, +Z up, face towards -Y, the middle between the pupils at the origin."""
     scan = next(iter(trimesh.load(data / NEEDED[0], process=False).geometry.values()))
     vertices = np.asarray(scan.vertices)[:, [0, 2, 1]] * [1, -1, 1] * METRES - MIDDLE
     faces = np.asarray(scan.faces, np.int64)
@@ -136,7 +136,7 @@ def read_scan(data: Path) -> Mesh:
 
 
 def face_of(data: Path, head: Mesh) -> np.ndarray:
-    """How far each vertex is facial skin, [V] in [0, 1]: the mean of lps_sun's masks where they see it."""
+    """Return how far each vertex is facial skin, [V] in [0, 1]: the mean of lps_sun's masks where they see it."""
     record = json.loads((data / NEEDED[4]).read_text(encoding="utf-8"))
     caster, normals = raster.RayCaster(head), vertex_normals(head)
     total, count = np.zeros(len(head.vertices)), np.zeros(len(head.vertices))
@@ -197,7 +197,7 @@ def _write_truth(target: Path, frame: int, view: View, scan: LitScan, over: int 
 
 
 def _developed(work: Path, faces: dict[int, tuple[np.ndarray, np.ndarray]]) -> Iterator[np.ndarray]:
-    """The frames as a phone shows them that stands still, sRGB [H, W, 3]."""
+    """Return the frames as a phone shows them that stands still, sRGB [H, W, 3]."""
     filmed = {frame: images.read_linear(work / f"{frame:05d}.exr") for frame in faces}
     gain, taken = exposure(filmed, faces), phone.sample_phone(SEED)
     for frame in range(FRAMES):

@@ -47,8 +47,8 @@ KINDS = ("self", "leaves", "blinds", "edge")
 
 
 def synthetic_capture(seed: int, kind: str, folder: Path) -> tuple[Capture, np.ndarray]:
-    """A capture with frames, cameras and head in `folder` (made once) and the true shadow in its head's UVs, bool
-    [SIZE, SIZE]: where the sun does not reach, be it that the surface turns away from it."""
+    """Return a capture with frames, cameras and head in `folder` (made once) and the true shadow in its head's UVs,
+    bool [SIZE, SIZE]: where the sun does not reach, be it that the surface turns away from it."""
     capture = Capture(folder)
     if not (capture.root / "truth.png").is_file():
         mesh, skin = subject_mesh(seed), make_skin(sample_parameters(seed), SIZE)
@@ -62,8 +62,8 @@ def synthetic_capture(seed: int, kind: str, folder: Path) -> tuple[Capture, np.n
 
 
 def lifted_truth(capture: Capture, truth: Path, size: int = SIZE) -> np.ndarray:
-    """The true shadow of TRUTH/shadow/NNNN.png (NNNN: frame of the video) in the UVs of a capture's head, bool [size,
-    size]."""
+    """Return the true shadow of TRUTH/shadow/NNNN.png (NNNN: frame of the video) in the UVs of a capture's head, bool
+    [size, size]."""
     frames = read_frames(capture).by_name
     pictures = {int(path.stem): path for path in (truth / "shadow").glob("*.png")}
     views = [
@@ -102,7 +102,7 @@ def _shadow(
 
 
 def registered(mesh: Mesh, seed: int) -> Mesh:
-    """The true head as a fit leaves it: off by OFF_M along its normals, smoothly over OFF_MM."""
+    """Return the true head as a fit leaves it: off by OFF_M along its normals, smoothly over OFF_MM."""
     off = noise(1000 * mesh.vertices, OFF_MM, np.random.default_rng([seed, 33]), smooth=True)
     return mesh.moved(
         mesh.vertices + meshes.vertex_normals(mesh) * (OFF_M * off / max(float(off.std()), 1e-6))[:, None]
@@ -122,7 +122,7 @@ def _photograph(capture: Capture, mesh: Mesh, texture: np.ndarray, rng: np.rando
 def write_views(
     capture: Capture, views: list[View], pictures: Iterable[np.ndarray], selected: int | None = None
 ) -> None:
-    """Writes frames/ with frames.json, and cameras/: pictures with the known cameras that took them.
+    """Write frames/ with frames.json, and cameras/: pictures with the known cameras that took them.
 
     capture: takes them; views: the cameras, which share one lens; pictures: sRGB [H, W, 3], one of each; selected: how
     many, evenly spread, are selected for the texture; None: all."""
@@ -147,7 +147,7 @@ def write_views(
 def render_picture(
     caster: raster.RayCaster, view: View, texture: np.ndarray, rng: np.random.Generator, rays: int = 2
 ) -> np.ndarray:
-    """A picture of a head before a dim, uneven background.
+    """Return a picture of a head before a dim, uneven background.
 
     caster: of the head; view: the camera; texture: lit, linear [S, S, 3]; rng: of background and noise; rays: along
     each side of a pixel. Returns sRGB [H, W, 3]."""

@@ -55,8 +55,8 @@ class Filmed:
 
     @cached_property
     def true_capture(self) -> Capture:
-        """A copy whose delit frames are the true albedo, up to its texture; made once, and again where the head or the
-        cameras changed."""
+        """Return a copy whose delit frames are the true albedo, up to its texture; made once, and again where the head
+        or the cameras changed."""
         copy = Capture(self.work / f"{self.name}.wildcap")
         same = ("head.obj", "cameras/cameras.bin", "cameras/images.bin")
         changed = copy.texture_confidence.is_file() and any(
@@ -67,7 +67,7 @@ class Filmed:
         return use_true_frames(self.capture, self.truth, copy, Settings())
 
     def inputs(self) -> list[Path]:
-        """The files that the figures of this capture depend on, but for the truth's pictures."""
+        """Return the files that the figures of this capture depend on, but for the truth's pictures."""
         capture = self.capture
         return [
             path
@@ -85,7 +85,7 @@ class Filmed:
 
     @cached_property
     def truth_map(self) -> np.ndarray:
-        """The texture of the true albedo frames, linear [S, S, 3] at its own size."""
+        """Return the texture of the true albedo frames, linear [S, S, 3] at its own size."""
         return images.read_linear(self.true_capture.texture)
 
     @cached_property
@@ -105,7 +105,7 @@ class Filmed:
         return face & ~(cv2.dilate(eyes.astype(np.uint8), np.ones((reach, reach), np.uint8)) > 0)
 
     def answer(self, method: str) -> np.ndarray | None:
-        """What a method takes for the albedo, linear [S, S, 3]; None where the capture was not taken so far."""
+        """Return what a method takes for the albedo, linear [S, S, 3]; None where the capture was not taken so far."""
         if method == TRUE:
             return self.truth_map
         paths = {DELIT: self.capture.texture, SOLVED: self.capture.maps / "diffuse_albedo.png"}
@@ -148,8 +148,8 @@ def _dense(mask: np.ndarray) -> np.ndarray:
 
 
 def find(folder: Path, truths: Path, work: Path) -> list[Filmed]:
-    """The captures of a folder that have a texture and a truth, in order of their names. Who a person is, the truths
-    say: the name stays when a capture is finished later than others."""
+    """Return the captures of a folder that have a texture and a truth, in order of their names. Who a person is, the
+    truths say: the name stays when a capture is finished later than others."""
     first: dict[str, str] = {}
     for truth in sorted(path.parent for path in truths.glob("*/albedo") if path.is_dir()):
         first.setdefault(_true_head(truth), truth.name)
@@ -170,7 +170,7 @@ def add_captures(parser: argparse.ArgumentParser) -> None:
 
 
 def captures_asked(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> list[Filmed]:
-    """The captures that these arguments name; ends with an error where there are none."""
+    """Return the captures that these arguments name; ends with an error where there are none."""
     folder = arguments.folder.resolve()
     found = [
         filmed
@@ -183,18 +183,19 @@ def captures_asked(parser: argparse.ArgumentParser, arguments: argparse.Namespac
 
 
 def landmarks_in_uv(size: int = SIZE) -> np.ndarray:
-    """The 468 landmarks on a map of the built-in head, [468, 2] in texels."""
+    """Return the 468 landmarks on a map of the built-in head, [468, 2] in texels."""
     mesh, (face, bary) = template.load(), template.landmarks()
     uv = interpolate(mesh.uvs, mesh.face_uvs, face, bary)
     return np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * size
 
 
 def rotation_between(points: np.ndarray, targets: np.ndarray) -> np.ndarray:
-    """The rotation [3, 3] that brings points [N, 3] nearest to targets [N, 3] of the same order (Kabsch 1976)."""
+    """Return the rotation [3, 3] that brings points [N, 3] nearest to targets [N, 3] of the same order (Kabsch
+    1976)."""
     u, _, vt = np.linalg.svd((points - points.mean(0)).T @ (targets - targets.mean(0)))
     return vt.T @ np.diag([1, 1, np.sign(np.linalg.det(vt.T @ u.T))]) @ u.T
 
 
 def _true_head(truth: Path) -> str:
-    """What tells two people apart: the true head, or the truth itself where it has none."""
+    """Return what tells two people apart: the true head, or the truth itself where it has none."""
     return hash_file(truth / "head.obj") if (truth / "head.obj").is_file() else str(truth)

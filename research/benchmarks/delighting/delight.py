@@ -142,7 +142,7 @@ def measure_rows(
     only: list[str] | None = None,
     picture: Path | None = None,
 ) -> dict[str, dict]:
-    """Scores each row's answers to a set of photographs. One that a delighter refuses counts as it is.
+    """Score each row's answers to a set of photographs. One that a delighter refuses counts as it is.
 
     chosen: the photographs; settings: of the delighters; features: whether the feature distance is measured, too; only:
     what the names of the rows begin with that are asked for; None: all; picture: file that shows six photographs'
@@ -196,7 +196,7 @@ def measure_rows(
 
 
 def rows(chosen: Photographs, settings: Settings) -> list[str]:
-    """What there is to compare on a set."""
+    """Return what there is to compare on a set."""
     on_captures = [name for name in delight.DELIGHTERS if name not in BROUGHT] if chosen.capture else []
     single = [
         f"{name}, one photograph"
@@ -207,7 +207,8 @@ def rows(chosen: Photographs, settings: Settings) -> list[str]:
 
 
 def predictions(row: str, chosen: Photographs, settings: Settings) -> Iterator[tuple[Photograph, np.ndarray | Problem]]:
-    """Each photograph of a set with what a row takes for its albedo, sRGB [H, W, 3], or why it does not serve it."""
+    """Return each photograph of a set with what a row takes for its albedo, sRGB [H, W, 3], or why it does not serve
+    it."""
     if row in ("none", FLAT):
         for photograph in chosen.photographs:
             yield (
@@ -249,7 +250,7 @@ def _set(name: str, options: argparse.Namespace, captures: dict[str, str], work:
 
 
 def _shown(srgb: np.ndarray, photograph: Photograph) -> np.ndarray:
-    """A delit picture as it is compared: after the gain per channel, the skin alone."""
+    """Return a delit picture as it is compared: after the gain per channel, the skin alone."""
     true = photograph.truth
     return square(
         np.where(true.face[..., None], with_gain(np.asarray(srgb, np.float32), true.albedo, true.face), 0), true.face

@@ -35,7 +35,7 @@ and Bernerd 2013)."""
 def score_picture(
     predicted: np.ndarray, photograph: np.ndarray, true: AlbedoTruth, features: bool = True
 ) -> dict[str, float]:
-    """Scores one delit picture over the facial skin of its truth.
+    """Score one delit picture over the facial skin of its truth.
 
     predicted: sRGB [H, W, 3]; photograph: sRGB [H, W, 3], what it was made from; true: the truth, of that size;
     features: whether the feature distance is measured, too. Returns FIGURES; nan what cannot be told."""
@@ -59,8 +59,8 @@ def score_picture(
 
 
 def stepping(log_shading: np.ndarray, mask: np.ndarray, shadow: np.ndarray) -> np.ndarray:
-    """Where along the shadow's edge the true light [H, W] (natural log) really steps, by LEAST_STEP or more: bool [H,
-    W]."""
+    """Return where along the shadow's edge the true light [H, W] (natural log) really steps, by LEAST_STEP or more:
+    bool [H, W]."""
     means, near = [], np.ones(mask.shape, bool)
     for band in edge_bands(shadow):
         weight = (band & mask).astype(np.float32)
@@ -76,13 +76,13 @@ def flat_tone(true: AlbedoTruth) -> np.ndarray:
 
 
 def tone_group(srgb: np.ndarray) -> str:
-    """The group of a skin tone, sRGB [3], by its individual typology angle: atan((L* - 50) / b*)."""
+    """Return the group of a skin tone, sRGB [3], by its individual typology angle: atan((L* - 50) / b*)."""
     angle = float(pigment.typology_angle(images.srgb_to_linear(srgb)))
     return next(name for name, above in TONES if angle > above or name == TONES[-1][0])
 
 
 def mean_of(scores: list[dict[str, float]]) -> dict[str, float | None]:
-    """The mean of each figure over the pictures that have it."""
+    """Return the mean of each figure over the pictures that have it."""
     return {
         name: float(np.mean(known)) if (known := [s[name] for s in scores if not math.isnan(s[name])]) else None
         for name in FIGURES
@@ -114,8 +114,8 @@ def table(results: dict[str, dict]) -> str:
 
 
 def shortfalls(results: dict[str, dict], ours: str = "network") -> list[str]:
-    """Where rows whose name begins with `ours` are no better than a RIVALS row of the same set, or of the same group in
-    it; detail is not asked for."""
+    """Return where rows whose name begins with `ours` are no better than a RIVALS row of the same set, or of the same
+    group in it; detail is not asked for."""
     found = []
     for name, rows in results.items():
         done = {
@@ -137,7 +137,7 @@ def shortfalls(results: dict[str, dict], ours: str = "network") -> list[str]:
 
 
 def square(srgb: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """The square about a mask [H, W], black where the picture ends."""
+    """Return the square about a mask [H, W], black where the picture ends."""
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
     half = round(0.55 * max(rows[-1] - rows[0], columns[-1] - columns[0]))
     # of the padded picture, where the square begins
@@ -146,7 +146,7 @@ def square(srgb: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def sheet(photographs: list[list[np.ndarray]], side: int = 192) -> np.ndarray:
-    """A row of square pictures for each photograph; sRGB [H, W, 3]."""
+    """Return a row of square pictures for each photograph; sRGB [H, W, 3]."""
     return np.vstack(
         [
             np.hstack([images.resize(np.asarray(picture, np.float32), side, side) for picture in row])

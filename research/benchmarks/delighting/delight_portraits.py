@@ -81,6 +81,6 @@ def _photograph(seed: int, light: int, group: str, work: Path) -> Photograph:
 
 @lru_cache(maxsize=1)
 def portrait_parts(seed: int, size: int) -> tuple[LightStage, Sight]:
-    """The light stage of a subject, and the subject as its camera sees it in a picture of side `size`."""
+    """Return the light stage of a subject, and the subject as its camera sees it in a picture of side `size`."""
     stage, skin = light_stage(subject_mesh(seed)), make_skin(adorned(sample_parameters(seed), seed), TEXELS)
     return stage, sample_sight(stage, skin, np.random.default_rng([seed, 40, 0]), size)

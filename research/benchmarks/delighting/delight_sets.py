@@ -71,7 +71,7 @@ def light_stage(folder: Path, every: int = 1) -> Photographs:
 
 
 def select_true_frames(truth: Path, capture: Capture, work: Path, every: int = 1) -> Photographs:
-    """The frames of a registered capture that have a truth, selected in a copy.
+    """Return the frames of a registered capture that have a truth, selected in a copy.
 
     truth: folder, laid out as research/benchmarks/maps/albedo_score.py says; capture: the registered one, which stays
     as it is; work: takes copy.wildcap; every: every n-th of these frames is taken; the copy selects all. Raises
@@ -102,8 +102,8 @@ def select_true_frames(truth: Path, capture: Capture, work: Path, every: int = 1
 
 
 def registered(truth: Path, work: Path) -> Capture:
-    """The capture of `truth`/capture.mp4 in the folder `work`, run until its head is registered; kept there for the
-    next time."""
+    """Return the capture of `truth`/capture.mp4 in the folder `work`, run until its head is registered; kept there for
+    the next time."""
     capture = Capture(work / f"{truth.name}.wildcap")
     if not capture.head.is_file():
         command = [

@@ -109,16 +109,16 @@ def main() -> int:
     parser.add_argument("--sets", nargs="+", choices=TITLES, default=list(TITLES))
     parser.add_argument("--subjects", type=int, default=2, help="of each group of skin tone")
     parser.add_argument("--json", type=Path, help="where the record goes, research/records/photographs.json")
-    asked = parser.parse_args()
-    if asked.weights:
-        importlib.import_module("core.stages.delight.network").WEIGHTS = asked.weights
+    options = parser.parse_args()
+    if options.weights:
+        importlib.import_module("core.stages.delight.network").WEIGHTS = options.weights
     text, record = [("", WORDS)], {}
-    for name in asked.sets:
+    for name in options.sets:
         try:
             scores = (
-                of_pairs(asked.subjects, asked.delighter)
+                of_pairs(options.subjects, options.delighter)
                 if name == "pairs"
-                else of_sitters(SITTERS[name](asked.data), asked.delighter)
+                else of_sitters(SITTERS[name](options.data), options.delighter)
             )
         except Problem as problem:
             text.append((TITLES[name], f"Not measured: {problem.problem} {problem.remedy}"))
@@ -127,13 +127,13 @@ def main() -> int:
         text.append((TITLES[name], format_table(found, COLUMNS, "answer")))
         record[name] = to_record(found, scores)
     print("\n\n".join(f"{heading}\n\n{body}" for heading, body in text))
-    if asked.json:
-        figures.write_record(asked.json, "photographs", COMMAND, record, keep=True)
+    if options.json:
+        figures.write_record(options.json, "photographs", COMMAND, record, keep=True)
     return 0
 
 
 def answer_photograph(srgb: np.ndarray, albedo: np.ndarray, lit: np.ndarray, delighter: str) -> dict[str, np.ndarray]:
-    """All answers to one photograph. A picture that the delighter refuses is taken as it is, as an artist would.
+    """Return all answers to one photograph. A picture that the delighter refuses is taken as it is, as an artist would.
 
     srgb: [H, W, 3]; albedo: [H, W, 3], linear, the truth; lit: bool [H, W], the pixels of the face that show something;
     delighter: a key of delight.PHOTOGRAPHERS. Returns Answer -> linear albedo [H, W, 3]."""
@@ -167,7 +167,7 @@ def of_sitters(sitters: Iterator[LightSeries], delighter: str) -> Scores:
 
 
 def of_sitter(sitter: LightSeries, answers: list[np.ndarray]) -> dict[str, float | None]:
-    """The figures of one answer to all of a sitter's pictures; answers linear [H, W, 3]."""
+    """Return the figures of one answer to all of a sitter's pictures; answers linear [H, W, 3]."""
     true = images.linear_to_srgb(sitter.albedo)
     log_true, truths = log_green(true), [contrasts(true, sitter.landmarks, lit) for lit in sitter.lit]
     shares, filmed = (
@@ -230,7 +230,7 @@ def of_pairs(subjects: int, delighter: str) -> Scores:
 
 
 def light_stage_sitters(data: Path) -> Iterator[LightSeries]:
-    """The people of DATA/faceolat. Raises Problem where it is not there."""
+    """Return the people of DATA/faceolat. Raises Problem where it is not there."""
     folder = data / "faceolat"
     if not (folder / "landmarks.json").is_file():
         raise Problem(f"{folder} has no landmarks.json.", "Name the folder that holds faceolat with --data.")
@@ -249,8 +249,8 @@ def light_stage_sitters(data: Path) -> Iterator[LightSeries]:
 
 
 def lamp_sitters(data: Path) -> Iterator[LightSeries]:
-    """The man of DATA/near_ps_human1, brightened to a usual exposure. Raises Problem where he is not there or no face
-    is found."""
+    """Return the man of DATA/near_ps_human1, brightened to a usual exposure. Raises Problem where he is not there or no
+    face is found."""
     folder = data / "near_ps_human1"
     paths = sorted(folder.glob("[0-9]*.png"))
     if not paths or not (folder / "ambient.png").is_file():

@@ -60,14 +60,14 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", help="cases whose names begin with one of these")
     parser.add_argument("--row", default="after")
     parser.add_argument("--json", type=Path, help="where the figures go, such as research/records/real_tones.json")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     figures = {}
-    for name, prepare in cases(asked.data).items():
-        if asked.only and not name.startswith(tuple(asked.only)):
+    for name, prepare in cases(options.data).items():
+        if options.only and not name.startswith(tuple(options.only)):
             continue
-        capture = Capture(asked.folder / f"{name}.wildcap")
+        capture = Capture(options.folder / f"{name}.wildcap")
         if not capture.shadow_mask_auto.is_file():
-            source = asked.folder / "sources" / name
+            source = options.folder / "sources" / name
             subprocess.run(
                 [
                     sys.executable,
@@ -85,11 +85,11 @@ def main() -> None:
                 check=True,
                 stdout=subprocess.DEVNULL,
             )
-        figures[name] = {asked.row: estimate(capture)}
-        print(name, *figures[name][asked.row].values(), flush=True)
-    if asked.json:
+        figures[name] = {options.row: estimate(capture)}
+        print(name, *figures[name][options.row].values(), flush=True)
+    if options.json:
         write_record(
-            asked.json,
+            options.json,
             "real_tones",
             "python -m research.benchmarks.delighting.real_tones DATA FOLDER",
             figures,
@@ -124,12 +124,12 @@ def cases(data: Path) -> dict[str, Callable[[Path], Path]]:
 
 
 def _turned(srgb: np.ndarray) -> np.ndarray:
-    """A picture of a phone that lay on its side, upright."""
+    """Return a picture of a phone that lay on its side, upright."""
     return np.rot90(srgb, -1)
 
 
 def _copied(pictures: list[Path], to: Path, change: Callable[[np.ndarray], np.ndarray] = lambda srgb: srgb) -> Path:
-    """Writes pictures, changed, to a folder, as 16 bit PNG; returns it."""
+    """Write pictures, changed, to a folder, as 16 bit PNG; returns it."""
     to.mkdir(parents=True, exist_ok=True)
     for path in pictures:
         images.write_srgb(to / f"{path.stem}.png", np.ascontiguousarray(change(images.read_srgb(path))))
@@ -137,7 +137,7 @@ def _copied(pictures: list[Path], to: Path, change: Callable[[np.ndarray], np.nd
 
 
 def _cut_out(srgb: np.ndarray, ground: float) -> np.ndarray:
-    """An sRGB picture [H, W, 3] whose ground behind the person is of one grey, mixed as light is."""
+    """Return an sRGB picture [H, W, 3] whose ground behind the person is of one grey, mixed as light is."""
     person = faces.segment_person(srgb)[..., None]
     return images.linear_to_srgb(
         person * images.srgb_to_linear(srgb) + (1 - person) * images.srgb_to_linear(np.full(3, ground, np.float32))
@@ -145,7 +145,7 @@ def _cut_out(srgb: np.ndarray, ground: float) -> np.ndarray:
 
 
 def estimate(capture: Capture) -> dict:
-    """The tone as sRGB, its L*, its stated deviation and its group."""
+    """Return the tone as sRGB, its L*, its stated deviation and its group."""
     head = read_filmed_head(capture)
     evidence = read_evidence(capture, head, TONE_SIDE_TEXELS)
     tone = estimate_skin_tone(capture, head, Settings(), evidence, Reporter("real_tones"))

@@ -51,25 +51,25 @@ def main() -> None:
         type=Path,
         help="where the figures go, such as research/records/shadow_mask.json; those of other rows stay",
     )
-    asked = parser.parse_args()
+    options = parser.parse_args()
     found: dict[str, dict] = {}
     print("| capture | delighter | " + " | ".join(COLUMNS) + " |\n| --- | --- |" + " --- |" * len(COLUMNS))
-    for delighter in asked.delighters:
-        names = [f"synthetic {seed}, {KINDS[seed % len(KINDS)]}" for seed in asked.seeds]
+    for delighter in options.delighters:
+        names = [f"synthetic {seed}, {KINDS[seed % len(KINDS)]}" for seed in options.seeds]
         rows = [
-            _row(*_synthetic(seed, delighter, asked.work), name, delighter)
-            for seed, name in zip(asked.seeds, names, strict=True)
+            _row(*_synthetic(seed, delighter, options.work), name, delighter)
+            for seed, name in zip(options.seeds, names, strict=True)
         ]
         found |= {f"{name}, {delighter}": _figures(name, delighter, row) for name, row in zip(names, rows, strict=True)}
         if len(rows) > 1:
             _print("mean of the synthetic", delighter, np.mean(rows, 0))
-    for capture, truth in asked.capture:
+    for capture, truth in options.capture:
         delighter = _delighter_of(Capture(capture))
-        row = _row(*_filmed(capture, truth, asked.work), capture.stem, delighter)
+        row = _row(*_filmed(capture, truth, options.work), capture.stem, delighter)
         found[f"{capture.stem}, {delighter}"] = _figures(capture.stem, delighter, row)
-    if asked.json:
+    if options.json:
         write_record(
-            asked.json,
+            options.json,
             "shadow_mask",
             "python -m research.benchmarks.delighting.shadow_mask",
             {"rows": found},
@@ -131,7 +131,7 @@ def _synthetic(seed: int, delighter: str, work: Path) -> tuple[Capture, np.ndarr
 
 
 def _filmed(source: Path, truth: Path, work: Path) -> tuple[Capture, np.ndarray]:
-    """A copy of the capture up to its texture."""
+    """Return a copy of the capture up to its texture."""
     copy = Capture(work / f"{source.stem}_copy.wildcap")
     shutil.rmtree(copy.root, ignore_errors=True)
     shutil.copytree(
@@ -145,7 +145,7 @@ def _delighter_of(capture: Capture) -> str:
 
 
 def _delit(capture: Capture, delighter: str, folder: Path) -> Capture:
-    """A copy of what the delighter needs, delit and textured by today's code."""
+    """Return a copy of what the delighter needs, delit and textured by today's code."""
     copy = begin_at_delight(capture, folder)
     _run(copy, delighter, "delight", "texture")
     return copy

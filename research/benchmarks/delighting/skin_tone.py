@@ -48,13 +48,13 @@ def main() -> None:
         type=Path,
         help="where the figures go, such as research/records/skin_tone.json; those of other captures stay",
     )
-    asked = parser.parse_args()
+    options = parser.parse_args()
     rows: dict[str, list] = {"scene": [], "measured": []}
     subjects = dict.fromkeys((name for _, name in TYPOLOGY_GROUPS), 0)
     for seed in (*sorted(RESERVED["seeds"]), *range(HELD_OUT_SEED, HELD_OUT_SEED + MOST)):
-        if min(subjects.values()) >= asked.each:
+        if min(subjects.values()) >= options.each:
             break
-        if subjects[expected(seed)] >= asked.each:
+        if subjects[expected(seed)] >= options.each:
             continue
         scenes = scenes_of(seed)
         name = name_group(scenes[0].tone)
@@ -69,12 +69,12 @@ def main() -> None:
                     rows[row].append((name, *errors(tone, scene.tone)))
     print_table(rows, subjects)
     captures = {}
-    for folder, truth in asked.capture:
+    for folder, truth in options.capture:
         tone = np.array([float(v) for v in Path(truth).read_text(encoding="ascii").split("#")[0].split(",")])
         captures[Path(folder).stem] = of_capture(Capture(folder), tone)
-    if asked.json:
+    if options.json:
         write_record(
-            asked.json,
+            options.json,
             "skin_tone",
             "python -m research.benchmarks.delighting.skin_tone --each 14 [--capture CAPTURE TONE.txt]",
             {"groups": summary(rows, subjects), "captures": captures},
@@ -83,7 +83,7 @@ def main() -> None:
 
 
 def expected(seed: int) -> str:
-    """The group that a subject's pigments promise, which is looked up sooner than its skin is made."""
+    """Return the group that a subject's pigments promise, which is looked up sooner than its skin is made."""
     p = sample_parameters(seed)
     tones = reflectance(np.array([p.melanin]), np.array([p.blood]), p.oxygen, p.scattering, p.slope, p.chroma)
     return name_group(tones[0])
@@ -132,7 +132,7 @@ def print_table(rows: dict[str, list], subjects: dict[str, int]) -> None:
 
 
 def of_capture(capture: Capture, srgb: np.ndarray) -> dict:
-    """The true L* of a finished capture, and the estimate's error of L*, delta E and stated deviation, which are
+    """Return the true L* of a finished capture, and the estimate's error of L*, delta E and stated deviation, which are
     printed."""
     truth, head = images.srgb_to_linear(srgb), read_head(capture)
     evidence = read_evidence(capture, head, TONE_SIDE_TEXELS)

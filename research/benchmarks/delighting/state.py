@@ -123,16 +123,16 @@ def main() -> int:
     )
     parser.add_argument("--page", type=Path, help="where the page goes, docs/results/state.md")
     parser.add_argument("--json", type=Path, help="where the record goes, research/records/state.json")
-    asked = parser.parse_args()
-    folder = asked.folder.resolve()
-    if asked.run and (folder / freeze.RECORD).is_file():
+    options = parser.parse_args()
+    folder = options.folder.resolve()
+    if options.run and (folder / freeze.RECORD).is_file():
         parser.error(f"{folder} is what research/benchmarks/freeze.py kept, and stays as it is. Run a copy of it.")
-    if asked.run:
+    if options.run:
         for path in sorted(folder.glob("*.wildcap")):
-            if path.stem.startswith(tuple(asked.only)) and (folder / path.stem / "skin_tone.txt").is_file():
+            if path.stem.startswith(tuple(options.only)) and (folder / path.stem / "skin_tone.txt").is_file():
                 run_chain(Capture(path), folder / path.stem)
     captures = [
-        filmed for filmed in find(folder, folder, folder / "state") if filmed.name.startswith(tuple(asked.only))
+        filmed for filmed in find(folder, folder, folder / "state") if filmed.name.startswith(tuple(options.only))
     ]
     if not captures:
         parser.error(
@@ -140,22 +140,22 @@ def main() -> int:
         )
     scores, by_capture = measure(captures)
     code = code_of(captures)
-    if asked.json and asked.json.is_file():
+    if options.json and options.json.is_file():
         scores, by_capture = merge_earlier(
-            figures.read_record(asked.json.stem, asked.json.parent)["figures"], scores, by_capture, code
+            figures.read_record(options.json.stem, options.json.parent)["figures"], scores, by_capture, code
         )
     text = sections(scores, by_capture)
     print("\n\n".join(f"{heading}\n\n{body}" for heading, body in text))
-    if asked.page:
-        write_page(asked.page, "The state of the albedo", f"{COMMAND} --page docs/results/{asked.page.name}", text)
-    if asked.json:
+    if options.page:
+        write_page(options.page, "The state of the albedo", f"{COMMAND} --page docs/results/{options.page.name}", text)
+    if options.json:
         found = summarise(
             scores, {name: column for columns in TABLES.values() for name, column in columns.items()}, DELIT
         )
         figures.write_record(
-            asked.json,
+            options.json,
             "state",
-            f"{COMMAND} --json research/records/{asked.json.name}",
+            f"{COMMAND} --json research/records/{options.json.name}",
             {**to_record(found, scores), "captures": by_capture, "code": code},
         )
     return 0
@@ -192,7 +192,8 @@ def measure(captures: list[Filmed]) -> tuple[Scores, dict[str, dict[str, Figures
 
 
 def code_of(captures: list[Filmed]) -> dict[str, str]:
-    """What made the figures: the keys of the stages' code in the captures' records, and the hash of the measures'."""
+    """Return what made the figures: the keys of the stages' code in the captures' records, and the hash of the
+    measures'."""
     stages = [filmed.capture.read()["stages"] for filmed in captures]
     keys = {
         name: " ".join(sorted({each[name]["code"][:12] for each in stages if name in each})) for name in freeze.STAGES
@@ -201,7 +202,7 @@ def code_of(captures: list[Filmed]) -> dict[str, str]:
 
 
 def measuring() -> dict[str, str]:
-    """The code that says what a figure is: file -> hash, in which words that only explain do not count."""
+    """Return the code that says what a figure is: file -> hash, in which words that only explain do not count."""
     files = [
         *sorted(Path(__file__).parents[1].glob("measures/*.py")),
         *(Path(module.__file__) for module in (state_scores, state_captures, albedo_score, delight_measures)),
@@ -217,8 +218,8 @@ def measuring() -> dict[str, str]:
 def merge_earlier(
     record: dict, scores: Scores, by_capture: dict[str, dict[str, Figures]], code: dict[str, str]
 ) -> tuple[Scores, dict]:
-    """What was measured now, over what a record has of other people; the record is left out, and that is said, where
-    other code made it.
+    """Return what was measured now, over what a record has of other people; the record is left out, and that is said,
+    where other code made it.
 
     record: its figures; scores: method -> person -> figures; by_capture: capture -> method -> figures; code: what
     `code_of` says. Returns Scores and figures by capture."""

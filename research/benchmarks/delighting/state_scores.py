@@ -129,7 +129,7 @@ def of_person(
 
 
 def mean_of(rows: list[Figures]) -> Figures:
-    """The mean of each figure over the rows that have it; None where none does."""
+    """Return the mean of each figure over the rows that have it; None where none does."""
     return {
         name: _mean([row.get(name) for row in rows]) for name in dict.fromkeys(name for row in rows for name in row)
     }
@@ -151,7 +151,7 @@ def _kept(filmed: Filmed, maps: dict[str, np.ndarray], method: str) -> Figures:
 
 
 def _seen(look: HeadInView, answer: np.ndarray) -> np.ndarray:
-    """A linear map as a look sees it, sRGB [H, W, 3]."""
+    """Return a linear map as a look sees it, sRGB [H, W, 3]."""
     return images.linear_to_srgb(np.clip(look.picture(answer), 0, 1))
 
 

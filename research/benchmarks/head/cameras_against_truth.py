@@ -119,7 +119,7 @@ def _paired(capture: Capture, true: dict) -> tuple[list[View], np.ndarray]:
 
 
 def _looked_at(centres: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """The point nearest to all optical axes."""
+    """Return the point nearest to all optical axes."""
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     return np.linalg.solve(across.sum(0), (across @ centres[:, :, None]).sum(0))[:, 0]
 

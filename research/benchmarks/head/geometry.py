@@ -50,7 +50,7 @@ class ScannedSubject:
 
 
 def subjects(data: Path) -> dict[str, ScannedSubject]:
-    """The captures by name; those of `data` that are not there are left out."""
+    """Return the captures by name; those of `data` that are not there are left out."""
     sample = ROOT / "research" / "people" / "sample"
     found = {
         "sample": ScannedSubject(sample / "capture.mp4", sample),
@@ -63,7 +63,7 @@ def subjects(data: Path) -> dict[str, ScannedSubject]:
 
 
 def measure_capture(name: str, subject: ScannedSubject, folder: Path, fresh: bool = False) -> dict:
-    """Runs a capture, compares it with the truth where there is one, and draws it.
+    """Run a capture, compares it with the truth where there is one, and draws it.
 
     name: of the capture; subject: what is captured; folder: takes NAME.wildcap and pictures/NAME.jpg; fresh: begin anew
     what is there. Returns The figures; "stopped" tells of the stage that failed, or is None."""

@@ -16,7 +16,8 @@ ROWS = {
 
 
 def table(figures: dict[str, dict]) -> str:
-    """The tables of {capture: figures of geometry.measure_capture}; what was not measured is a dash or is said."""
+    """Return the tables of {capture: figures of geometry.measure_capture}; what was not measured is a dash or is
+    said."""
     results = figures
     tables = [_cameras(results), _surfaces(results), _textures(results), _costs(results)]
     stopped = [
@@ -34,7 +35,8 @@ def table(figures: dict[str, dict]) -> str:
 
 
 def published(results: dict[str, dict]) -> dict[str, dict]:
-    """What of the results goes into the record: all but the stages' own figures that no table shows, and pictures."""
+    """Return what of the results goes into the record: all but the stages' own figures that no table shows, and
+    pictures."""
     return {
         name: {
             part: {**of, "own": _millimetres(of["own"])} if isinstance(of, dict) and "own" in of else of

@@ -52,7 +52,7 @@ def verdict(probabilities: list[float]) -> str:
 
 
 def look(srgb: np.ndarray) -> float:
-    """How surely a picture shows glasses; nan where no face is found or it is turned too far."""
+    """Return how surely a picture shows glasses; nan where no face is found or it is turned too far."""
     share = min(1.0, LONG_SIDE / max(srgb.shape[:2]))
     srgb = images.resize(srgb, round(srgb.shape[1] * share), round(srgb.shape[0] * share)) if share < 1 else srgb
     face = faces.detect(srgb)
@@ -121,17 +121,17 @@ def main() -> None:
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_glasses")
     parser.add_argument("--hdri", type=Path)
     parser.add_argument("--json", type=Path)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     record = {
         "real": {
             name: counted([[look(picture) for picture in capture] for capture in captures])
-            for name, captures in real(asked.data).items()
+            for name, captures in real(options.data).items()
         }
     }
-    record["rendered"] = rendered(asked.work, asked.hdri)
+    record["rendered"] = rendered(options.work, options.hdri)
     print(json.dumps(record, indent=1))
-    if asked.json:
-        figures.write_record(asked.json, "glasses", COMMAND, record)
+    if options.json:
+        figures.write_record(options.json, "glasses", COMMAND, record)
 
 
 if __name__ == "__main__":

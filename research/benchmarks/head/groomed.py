@@ -163,7 +163,7 @@ def to_table(rows: dict[str, dict]) -> str:
 
 
 def shortfalls(rows: dict[str, dict]) -> str:
-    """Which rows miss what is wanted, and how often following the strokes is worth it."""
+    """Return which rows miss what is wanted, and how often following the strokes is worth it."""
     told = [(f"the {name} person's {part}", row) for name, parts in rows.items() for part, row in parts.items()]
     known = [row for _, row in told if "degrees" in row]
     thin = [f"{what} ({row['iou']:.2f})" for what, row in told if row["iou"] < WANTED_IOU]
@@ -181,7 +181,7 @@ def shortfalls(rows: dict[str, dict]) -> str:
 
 
 def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
-    """The figures of one person, and a picture [H, W, 3]: frame, true hair, grown hair."""
+    """Return the figures of one person, and a picture [H, W, 3]: frame, true hair, grown hair."""
     figure = make_figure(seed)
     views, seen = photograph(folder / str(seed), figure)
     surface = lay_out(figure.head, SIZE)
@@ -293,7 +293,7 @@ def overlaps(figure: Figure, views: list[View], true: Strands | None, grown: Str
 
 
 def sow_anew(figure: Figure, part: str) -> Strands:
-    """A person's hairs of a part as they would be with other roots."""
+    """Return a person's hairs of a part as they would be with other roots."""
     return SOWN[part](
         figure.person, ground_of(figure.head), SkinSurface(figure.head), np.random.default_rng([figure.person.seed, 99])
     )
@@ -318,12 +318,12 @@ def _cover(figure: Figure, view: View, hairs: Strands | None) -> np.ndarray:
 
 
 def _around(cover: np.ndarray, millimetres: float) -> np.ndarray:
-    """The cover of a pixel's surroundings: single hairs are no shape."""
+    """Return the cover of a pixel's surroundings: single hairs are no shape."""
     return cv2.GaussianBlur(cover, (0, 0), millimetres * PX_PER_MM)
 
 
 def _picture(figure: Figure, view: View, true: dict, grown: dict) -> np.ndarray:
-    """The frame, true hair and grown hair on the bare skin, seen from the front, [H, W, 3] sRGB."""
+    """Return the frame, true hair and grown hair on the bare skin, seen from the front, [H, W, 3] sRGB."""
     crop = slice(int(0.25 * view.height), int(0.8 * view.height)), slice(int(0.15 * view.width), int(0.85 * view.width))
     shown = [view.read()[crop]]
     for hairs in (true, grown):

@@ -32,7 +32,7 @@ from ...people.sample import RESERVED
 
 
 def compare_surface(capture: Capture, truth: Path, mesh: Path | None, surface: str = "head.obj") -> dict:
-    """Measures how far a capture's surface lies off the true one, over the face's pixels.
+    """Measure how far a capture's surface lies off the true one, over the face's pixels.
 
     capture: with cameras; truth: its folder, with cameras and face/; mesh: the true surface; None: the sample's
     subject; surface: file of the capture, OBJ or PLY. Returns Median, 90th and 95th percentile in mm, as placed by the
@@ -69,8 +69,8 @@ def settle(hits: np.ndarray, points: np.ndarray, normals: np.ndarray) -> np.ndar
 
 
 def pose_of_truth(capture: Capture, truth: Path) -> tuple[Similarity, list[View], np.ndarray]:
-    """What brings the world of TRUTH's cameras.json into the capture's, the views that are in both, and their true
-    centres [N, 3]."""
+    """Return what brings the world of TRUTH's cameras.json into the capture's, the views that are in both, and their
+    true centres [N, 3]."""
     frames = {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()}
     cameras = {
         c["frame"]: np.array(c["matrix_world"])[:3, 3]
@@ -97,7 +97,7 @@ def sample_truth(mesh: Path | None = None, count: int = 1_500_000) -> tuple[np.n
 
 
 def _face_points(mesh: meshes.Mesh, views: list, frames: dict, truth: Path) -> np.ndarray:
-    """Where the pixels of the facial-skin masks hit our surface [N, 3]."""
+    """Return where the pixels of the facial-skin masks hit our surface [N, 3]."""
     caster, hits = raster.RayCaster(mesh), []
     for view in views:
         path = truth / "face" / f"{frames[view.name]:04d}.png"

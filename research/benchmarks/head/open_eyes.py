@@ -69,10 +69,10 @@ def main() -> None:
     )
     parser.add_argument("--eyes", type=Path, help="captures of research/benchmarks/captures/eye_captures.py")
     parser.add_argument("--json", type=Path)
-    asked = parser.parse_args()
-    rows = fit_alone(asked.eyes.resolve()) if asked.eyes else {}
-    for name in asked.only:
-        capture, truth = Capture(asked.folder.resolve() / f"{name}.wildcap"), asked.folder.resolve() / name
+    options = parser.parse_args()
+    rows = fit_alone(options.eyes.resolve()) if options.eyes else {}
+    for name in options.only:
+        capture, truth = Capture(options.folder.resolve() / f"{name}.wildcap"), options.folder.resolve() / name
         if not capture.head.is_file():
             print(f"{name} has no head and is left out.", file=sys.stderr)
             continue
@@ -87,9 +87,9 @@ def main() -> None:
             ],
         )
     )
-    if asked.json:
+    if options.json:
         write_record(
-            asked.json,
+            options.json,
             "open_eyes",
             "python -m research.benchmarks.head.open_eyes FOLDER --eyes FOLDER",
             {"rows": rows},
@@ -98,7 +98,7 @@ def main() -> None:
 
 
 def compare(capture: Capture, truth: Path) -> list[dict]:
-    """The figures of the left and of the right eye."""
+    """Return the figures of the left and of the right eye."""
     (scale, turn, shift), _ = place_truth(capture, truth)
     person = json.loads((truth / "cameras.json").read_text(encoding="utf-8"))["person"]
     closed = meshes.read_obj(truth / "head.obj")
@@ -115,15 +115,16 @@ def compare(capture: Capture, truth: Path) -> list[dict]:
 
 
 def missed(truth: Path) -> list[dict]:
-    """The figures of the two eyes of a person whose eyes were taken for closed: none, but how open they are; no rows
-    where they are closed."""
+    """Return the figures of the two eyes of a person whose eyes were taken for closed: none, but how open they are; no
+    rows where they are closed."""
     openness = json.loads((truth / "cameras.json").read_text(encoding="utf-8"))["person"]["openness"]
     row = {**dict.fromkeys(COLUMNS), "openness": 0.0, "true openness": _plain(openness)}
     return [row, row] if openness else []
 
 
 def fit_alone(folder: Path) -> dict[str, dict]:
-    """The figures of the captures of eye_captures.py, by person and eye, fitted and as the head alone has them."""
+    """Return the figures of the captures of eye_captures.py, by person and eye, fitted and as the head alone has
+    them."""
     rows, still = {}, (1.0, np.eye(3), np.zeros(3))
     for seed in (seed for seed in EYES if (folder / f"{seed}.wildcap" / "head.obj").is_file()):
         capture = Capture(folder / f"{seed}.wildcap")
@@ -155,7 +156,7 @@ def irises_over_own_skin(views: list[View], fitted: eyeballs.OpenEyes, seed: int
 
 
 def compare_eye(eye: Eyeball, opened: np.ndarray, true: lids.OpenHead, side: int, pose: tuple) -> dict:
-    """Measures how far a fitted eye is off the true one.
+    """Measure how far a fitted eye is off the true one.
 
     eye: the fitted eyeball; opened: [N, 3], vertices of the open head, in the eyeball's world; true: the true open
     head; side: 0 the left eye, 1 the right one; pose: scale, rotation [3, 3] and translation [3] from the truth's world
@@ -199,7 +200,7 @@ def apart(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def _curve(opened: lids.OpenHead, side: int, lid: int) -> np.ndarray:
-    """The true edge of a lid from corner to corner [N, 3], finely."""
+    """Return the true edge of a lid from corner to corner [N, 3], finely."""
     outer, inner = lids.corners()[side]
     points = opened.skin.vertices[[inner, *opened.rims[side][lid], outer]]
     return np.concatenate(

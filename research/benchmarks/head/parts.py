@@ -63,38 +63,38 @@ COLOURS = (
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("--json", type=Path)
-    asked.add_argument(
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--json", type=Path)
+    options.add_argument(
         "--frames", type=Path, metavar="FOLDER", help="what research.benchmarks.captures.likenesses wrote"
     )
-    asked.add_argument("--weights", type=Path, default=parser.WEIGHTS)
-    asked.add_argument("--sheet", type=Path, help="draw the parts of photographs instead")
-    asked.add_argument("--pictures", type=Path, nargs="+", default=[])
-    asked = asked.parse_args()
-    network = parser.load(asked.weights.resolve())
-    if asked.sheet:
-        write_sheet(asked.sheet, asked.pictures, network)
+    options.add_argument("--weights", type=Path, default=parser.WEIGHTS)
+    options.add_argument("--sheet", type=Path, help="draw the parts of photographs instead")
+    options.add_argument("--pictures", type=Path, nargs="+", default=[])
+    options = options.parse_args()
+    network = parser.load(options.weights.resolve())
+    if options.sheet:
+        write_sheet(options.sheet, options.pictures, network)
         return
     crops = {person.name: list(_crops(photographs(person.seed), network)) for person in LIKENESSES}
     rows = {name: row(found, VIEWS) for name, found in crops.items()}
     rows["all"] = row([crop for found in crops.values() for crop in found], VIEWS * len(crops))
     usual = [(truth, usual_parts(crops, name), known) for name, found in crops.items() for truth, _, known in found]
     rows["all, where parts usually are"] = row(usual, VIEWS * len(crops))
-    for person in LIKENESSES if asked.frames else ():
-        if (asked.frames / person.name / "parts").is_dir():
-            frames = list(filmed(asked.frames / person.name))
+    for person in LIKENESSES if options.frames else ():
+        if (options.frames / person.name / "parts").is_dir():
+            frames = list(filmed(options.frames / person.name))
             rows[f"{person.name}, filmed"] = row(list(_crops(frames, network)), len(frames))
     lines = []
     for name, r in rows.items():
         shares = (*r["iou"].values(), r["hair_as_skin"], r["skin_as_hair"])
         lines.append([name, f"{r['found']} of {r['pictures']}", *(None if v is None else f"{v:.2f}" for v in shares)])
     print(markdown(["person", "found", *PARTS, "hair as skin", "skin as hair"], lines))
-    if asked.json:
+    if options.json:
         write_record(
-            asked.json,
+            options.json,
             "parts",
-            "python -m research.benchmarks.head.parts" + (" --frames FOLDER" if asked.frames else ""),
+            "python -m research.benchmarks.head.parts" + (" --frames FOLDER" if options.frames else ""),
             {"rows": rows},
             keep=True,
         )
@@ -110,7 +110,7 @@ def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 
 
 def filmed(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """The frames with truth of a filmed person and their shares, each hair SPARSE times."""
+    """Return the frames with truth of a filmed person and their shares, each hair SPARSE times."""
     names = sorted(path.stem for path in (folder / "parts" / "hair").glob("*.png"))
     for number, frame in enumerate(read_film(folder / "capture.mp4")):
         if f"{number:04d}" in names:
@@ -133,13 +133,13 @@ def _crops(
 
 
 def usual_parts(crops: dict[str, list], name: str) -> np.ndarray:
-    """The part that most pictures of the other people show at each pixel of the crop."""
+    """Return the part that most pictures of the other people show at each pixel of the crop."""
     others = np.stack([truth for other, found in crops.items() if other != name for truth, _, _ in found])
     return np.stack([(others == k).sum(0) for k in range(len(PARTS))]).argmax(0)
 
 
 def row(crops: list[tuple[np.ndarray, np.ndarray, np.ndarray]], pictures: int) -> dict:
-    """The figures of some crops: (truth, found, known) each."""
+    """Return the figures of some crops: (truth, found, known) each."""
     counted = np.zeros((len(PARTS), len(PARTS)), int)
     for truth, found, known in crops:
         np.add.at(counted, (truth[known], found[known]), 1)

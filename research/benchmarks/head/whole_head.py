@@ -64,18 +64,18 @@ def main() -> None:
         type=Path,
         help="where the figures go, such as research/records/whole_head.json; those of other captures stay",
     )
-    asked = parser.parse_args()
+    options = parser.parse_args()
     found = {}
-    if asked.seeds:
-        surface = lay_out(template.load(), asked.size)
-        rows = [{**whole(seed, surface), **hairs(seed, surface)} for seed in asked.seeds]
+    if options.seeds:
+        surface = lay_out(template.load(), options.size)
+        rows = [{**whole(seed, surface), **hairs(seed, surface)} for seed in options.seeds]
         found["synthetic"] = {name: _mean([row[name] for row in rows]) for name in rows[0]}
-    for path in asked.captures:
-        found[path.stem] = of_capture(Capture(path), asked.subject)
+    for path in options.captures:
+        found[path.stem] = of_capture(Capture(path), options.subject)
     print(json.dumps(found, indent=1))
-    if asked.json:
+    if options.json:
         write_record(
-            asked.json,
+            options.json,
             "whole_head",
             "python -m research.benchmarks.head.whole_head [--subject SEED] [CAPTURE]",
             found,
@@ -84,7 +84,7 @@ def main() -> None:
 
 
 def whole(seed: int, surface: HeadSurface) -> dict:
-    """How near the hidden head comes to its truth."""
+    """Return how near the hidden head comes to its truth."""
     size = surface.size
     truth, face = _painted(surface, seed), template.mask("face", size)
     skin = torch.from_numpy(np.ascontiguousarray(template.mask("skin", size)))
@@ -117,7 +117,7 @@ def whole(seed: int, surface: HeadSurface) -> dict:
 
 
 def hairs(seed: int, surface: HeadSurface) -> dict:
-    """How well hair is found and taken away; the subject three times: bearded, shaven, without brows."""
+    """Return how well hair is found and taken away; the subject three times: bearded, shaven, without brows."""
     bearded, shaven, bare = (
         _painted(surface, seed, **changes)
         for changes in ({"beard": 0.8, "beard_length": 1.0}, {"beard": 0.0}, {"beard": 0.0, "brow_density": 0.0})
@@ -137,7 +137,7 @@ def hairs(seed: int, surface: HeadSurface) -> dict:
 
 
 def of_capture(capture: Capture, subject: int | None = None) -> dict:
-    """How far the border and the map's cut show, before and after, and how much hair there is."""
+    """Return how far the border and the map's cut show, before and after, and how much hair there is."""
     maps = read_maps(capture.maps, capture.texture_confidence)
     surface = lay_out(read_head(capture).mesh, len(maps.diffuse))
     report = Reporter("upscale")

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Throws spoiled files and odd names at the chain, and judges by itself whether each was met as it should be.
+"""Throw spoiled files and odd names at the chain, and judges by itself whether each was met as it should be.
 
     python -m research.benchmarks.hostile [--count 1000] [--seed 0] [--only K] [--until transfer] [--json
     research/records/hostile.json]

@@ -114,7 +114,7 @@ def kinds(names: tuple[str, ...]) -> dict[str, Kind]:
 
 
 def make_case(kind: Kind, place: Path, stock: Stock, rng: random.Random) -> Case:
-    """Makes a new case, its capture of hard links: nothing may be written into a file that is there.
+    """Make a new case, its capture of hard links: nothing may be written into a file that is there.
 
     kind: of the case; place: the folder that is made; stock: what is copied and brought; rng: decides the rest."""
     shutil.copytree(stock.undisturbed.folder / "end", place, symlinks=True, copy_function=os.link)
@@ -321,5 +321,5 @@ def _draw_masks(folder: Path) -> None:
 
 
 def is_book(case: Case) -> bool:
-    """Whether what was spoiled is one of the capture's own books, which are written over."""
+    """Return whether what was spoiled is one of the capture's own books, which are written over."""
     return case.spoiled is not None and case.spoiled.name in BOOKS

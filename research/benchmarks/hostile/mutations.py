@@ -167,7 +167,7 @@ def forge_exr(path: Path, rng: random.Random) -> str:
 
 
 def spoil_pixels(path: Path, rng: random.Random) -> str:
-    """Rewrites a picture with other values, size or channels."""
+    """Rewrite a picture with other values, size or channels."""
     import numpy as np
     import OpenImageIO as oiio
 
@@ -277,7 +277,7 @@ SPECIAL = {
 
 
 def mutate(path: Path, rng: random.Random) -> tuple[str, str]:
-    """Spoils a file; the mutation's name and what it did."""
+    """Spoil a file; the mutation's name and what it did."""
     ways = (*ANY, *SPECIAL.get(path.suffix, ()) * 2)
     way = rng.choice(ways)
     return way.__name__, way(path, rng)

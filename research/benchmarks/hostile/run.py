@@ -44,7 +44,7 @@ class Ended:
 
 
 def run(case: Case) -> Ended:
-    """Runs the case's command line as `python -m core` does, but for the worker, which is this process's own fork and
+    """Run the case's command line as `python -m core` does, but for the worker, which is this process's own fork and
     not a new Python."""
     told = case.place.with_suffix(".out"), case.place.with_suffix(".err")
     sys.stdout.flush()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Kills workers, the add-on and COLMAP at random moments over the real stages, and looks at what is left and at what
+"""Kill workers, the add-on and COLMAP at random moments over the real stages, and looks at what is left and at what
 the next run makes of it.
 
     python -m research.benchmarks.kills [--count 200] [--seed 0] [--only K] [--json research/records/kills.json]

@@ -138,7 +138,7 @@ class Undisturbed:
         return place
 
     def deliver(self, place: Path, target: Path, settings: dict) -> Forked:
-        """Delivers the head of a finished place to one of its delivery folders, undisturbed."""
+        """Deliver the head of a finished place to one of its delivery folders, undisturbed."""
         return run(place, **self.delivery_job(place, target, settings))
 
     def delivery_job(self, place: Path, target: Path, settings: dict = DELIVERY) -> dict:
@@ -157,7 +157,7 @@ class Undisturbed:
 def run_undisturbed(
     folder: Path, until: str = stages.NAMES[-1], delighter: str = "network", tell: Callable[[str], None] = print
 ) -> Undisturbed:
-    """Runs the chain up to a stage, and keeps the place before each and at the end.
+    """Run the chain up to a stage, and keeps the place before each and at the end.
 
     folder: takes before_STAGE and end; until: the last stage; delighter: its setting; tell: hears a line per stage.
     Raises AssertionError where a stage does not end well; and the machine's own errors."""
@@ -182,7 +182,7 @@ def capture_at(place: Path) -> Capture:
 def start_job(
     place: Path, moment: Moment | None = None, *, log_name: str = "told", limits: dict | None = None, **job
 ) -> Forked:
-    """Writes a job and starts a worker at it.
+    """Write a job and starts a worker at it.
 
     place: whose capture; moment: when the worker is struck; None: never; log_name: ending of the file beside the place
     that takes its output; limits: `term_s` and `most_bytes` of `fork_worker`; job: as `write_job` has it."""
@@ -192,7 +192,7 @@ def start_job(
 
 
 def run(place: Path, **job) -> Forked:
-    """Runs a job to its end, which has to be a good one."""
+    """Run a job to its end, which has to be a good one."""
     worker = start_job(place, **job)
     ended = worker.wait()
     assert isinstance(ended, Done), ended or worker.told.with_suffix(".err").read_text()

@@ -20,7 +20,7 @@ PRIVATE, REMOUNT, DETACH = 0x4000 | 0x40000, 0x20, 0x2  # MS_REC | MS_PRIVATE, M
 
 
 def go_private() -> bool:
-    """Gives this process mounts of its own; False where the system does not allow it. Only before it has started a
+    """Give this process mounts of its own; False where the system does not allow it. Only before it has started a
     thread."""
     if not sys.platform.startswith("linux"):
         return False
@@ -46,7 +46,7 @@ def mount(folder: Path, size: int) -> None:
 
 
 def resize(folder: Path, size: int) -> None:
-    """Gives a disk of `mount` another size."""
+    """Give a disk of `mount` another size."""
     _call("mount", b"tmpfs", bytes(folder), b"tmpfs", REMOUNT, f"size={size}".encode())
 
 

@@ -31,7 +31,7 @@ def judge_kill(
     masks: Mapping[str, Collection[bytes]] | None = None,
     within: Collection[str] = (),
 ) -> list[str]:
-    """Finds the faults of a place in which something was killed.
+    """Find the faults of a place in which something was killed.
 
     place: judged; known_contents: name in the capture -> hashes of the complete contents that it may have; masks: name
     -> contents that a mask may have which was being painted; within: folders in which files are new in every run, of
@@ -63,7 +63,7 @@ def judge_resume(
     unlike: Collection[str] = (),
     within: Collection[str] = (),
 ) -> list[str]:
-    """Finds the faults of a place in which the run that goes on has ended: every stage has the undisturbed run's bytes,
+    """Find the faults of a place in which the run that goes on has ended: every stage has the undisturbed run's bytes,
     all of the user's is in its place, and nothing else is left.
 
     place: judged; undisturbed: the run that it is compared with; last: the last stage that was run; masks, within: as

@@ -76,7 +76,7 @@ class KillTrial:
         self.faults.append(text)
 
     def judge_end(self, stage: str, masks: dict | None = None, unlike: tuple = (), unlike_folders: tuple = ()) -> None:
-        """Takes in the faults at the end of a run that went on.
+        """Take in the faults at the end of a run that went on.
 
         stage: the last one that was run; masks, unlike: as `judge.judge_resume` has them; unlike_folders: its `within`.
         """
@@ -206,7 +206,7 @@ def _holder(lock: Path) -> int | None:
 
 
 def wait_until(true: Callable[[], object], limit_s: float = 10 * SHORT_TERM_S) -> None:
-    """Returns then, or when the time is over."""
+    """Return then, or when the time is over."""
     deadline = time.monotonic() + limit_s
     while not true() and time.monotonic() < deadline:
         time.sleep(0.002)

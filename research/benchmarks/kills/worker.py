@@ -50,7 +50,7 @@ class Moment:
 
 
 def warm_up() -> None:
-    """Imports all that a worker comes to import, reads what every worker reads of the code, and starts no thread."""
+    """Import all that a worker comes to import, reads what every worker reads of the code, and starts no thread."""
     for step in (*stages.STAGES, *stages.TOOLS):
         importlib.import_module(step.module)
     for stage in stages.STAGES:
@@ -95,7 +95,7 @@ class Forked:
         return struct.unpack_from("q", self._shared, 0)[0]
 
     def strike(self, number: int = signal.SIGKILL) -> bool:
-        """Waits for the moment and sends the signal to the group; waits for the end of what was killed. False where the
+        """Wait for the moment and sends the signal to the group; waits for the end of what was killed. False where the
         process ended before."""
         reached = None
         while not self.ended():
@@ -128,7 +128,7 @@ class Forked:
         return last_message(self.told)
 
     def ended(self) -> bool:
-        """Whether the process itself has; what it started may go on."""
+        """Return whether the process itself has; what it started may go on."""
         if self.code is None:
             pid, status = os.waitpid(self.pid, os.WNOHANG)
             if pid:
@@ -154,7 +154,7 @@ class Forked:
 def fork_worker(
     job: Path, log: Path, moment: Moment | None = None, *, term_s: float = lease.TERM_S, most_bytes: int | None = None
 ) -> Forked:
-    """Forks a worker at a job file.
+    """Fork a worker at a job file.
 
     job: job.json, in its capture; log: takes its output; moment: when it is struck; None: never; term_s: of its lease,
     in seconds; most_bytes: of a single file that it writes; None: any."""
@@ -219,7 +219,8 @@ def running_at(place: Path) -> list[int]:
 
 
 def _changes(event: str, arguments: tuple, root: str) -> bool:
-    """Whether an audit event changes something in the folder `root`, or opens what is just being written there."""
+    """Return whether an audit event changes something in the folder `root`, or opens what is just being written
+    there."""
     if event == "open":
         path, _, flags = arguments
         name = os.fsdecode(path) if isinstance(path, str | bytes) else ""

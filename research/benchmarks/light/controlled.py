@@ -67,23 +67,23 @@ def main() -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
     parser.add_argument("--json", type=Path)
-    asked = parser.parse_args()
-    folder = asked.folder.resolve()
+    options = parser.parse_args()
+    folder = options.folder.resolve()
     if not folder.is_dir():
         parser.error(f"There is no folder {folder}. research/benchmarks/captures/people.py makes it.")
-    found = {name: rows for name in asked.only if (rows := measure(folder, name))}
+    found = {name: rows for name in options.only if (rows := measure(folder, name))}
     if not found:
         parser.error(f"{folder} holds no capture of research/benchmarks/captures/people.py.")
     known = (
-        figures.read_record(asked.json.stem, asked.json.parent)["figures"]["people"]
-        if asked.json and asked.json.exists()
+        figures.read_record(options.json.stem, options.json.parent)["figures"]["people"]
+        if options.json and options.json.exists()
         else {}
     )
     everyone = figures.merged(known, found)
     people = {p.name: everyone[p.name] for p in PEOPLE if p.name in everyone}
     summary = {"people": people, "mean": means(people)}
-    if asked.json:
-        figures.write_record(asked.json, "controlled", COMMAND, summary)
+    if options.json:
+        figures.write_record(options.json, "controlled", COMMAND, summary)
     print(table(summary))
     return 0
 
@@ -158,7 +158,7 @@ def means(rows_of_people: dict[str, dict]) -> dict[str, dict]:
 
 
 def whole(rows_of_people: dict[str, dict], table_rows: dict) -> list[dict]:
-    """The people whose rows of one table are all there."""
+    """Return the people whose rows of one table are all there."""
     return [rows for rows in rows_of_people.values() if {*table_rows} <= {*rows}]
 
 
@@ -235,8 +235,8 @@ def table(record: dict) -> str:
 
 
 def _set(folder: Path, name: str, place: str) -> Capture:
-    """The person's capture at a place. Raises Problem where its head is not the wild capture's, in whose frames all is
-    scored."""
+    """Return the person's capture at a place. Raises Problem where its head is not the wild capture's, in whose frames
+    all is scored."""
     capture = Capture(folder / f"{name}_{place}.wildcap")
     if capture.head.read_bytes() != (folder / f"{name}.wildcap" / "head.obj").read_bytes():
         raise Problem(

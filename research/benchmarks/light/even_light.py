@@ -67,7 +67,7 @@ def main() -> int:
 
 
 def given_back(way: str, albedo: tuple[float, float, float]) -> list[float]:
-    """The sphere's middle over its albedo, red, green, blue."""
+    """Return the sphere's middle over its albedo, red, green, blue."""
     import bpy
 
     bpy.ops.wm.read_homefile(use_empty=True)

@@ -79,7 +79,7 @@ def write_delit(capture: Capture, folder: Path) -> Highlight:
 
 
 def lit(view: View, linear: np.ndarray, head: Head) -> Lit:
-    """A frame, linear [H, W, 3], of the size of its view, with the light of a lamp at the camera on the head."""
+    """Return a frame, linear [H, W, 3], of the size of its view, with the light of a lamp at the camera on the head."""
     face, bary, distance = raster.render_view(head.caster, view)
     mesh, hit = head.mesh, face >= 0
     normal = raster.interpolate(head.normals, mesh.faces, face, bary)
@@ -101,7 +101,7 @@ def highlight(frames: list[Lit], surface: Unfolded) -> Highlight:
 
 
 def matte(frame: Lit, highlight: Highlight) -> np.ndarray:
-    """A frame over its shading without its highlight, linear [H, W, 3], zero beside the head."""
+    """Return a frame over its shading without its highlight, linear [H, W, 3], zero beside the head."""
     at = np.stack([frame.uv[..., 0], 1 - frame.uv[..., 1]], -1).reshape(-1, 2) * len(highlight.strength)
     strength = raster.sample(highlight.strength, at).reshape(frame.unshaded.shape)
     return np.maximum(
@@ -110,9 +110,9 @@ def matte(frame: Lit, highlight: Highlight) -> np.ndarray:
 
 
 def lobe(cosine: np.ndarray, roughness: float) -> np.ndarray:
-    """The GGX highlight under a lamp at the camera over a white diffuse surface's brightness, for a normal reflectance
-    F0 of 1: D G2 pi / (4 c^2), [...] (Walter et al. 2007; h = l = v, so Fresnel's term is constant and the strength of
-    a real surface is F0 itself)."""
+    """Return the GGX highlight under a lamp at the camera over a white diffuse surface's brightness, for a normal
+    reflectance F0 of 1: D G2 pi / (4 c^2), [...] (Walter et al. 2007; h = l = v, so Fresnel's term is constant and the
+    strength of a real surface is F0 itself)."""
     alpha2, c2 = roughness**4, np.clip(cosine, LEAST, 1) ** 2
     distribution = alpha2 / (np.pi * (c2 * (alpha2 - 1) + 1) ** 2)
     # 1 + 2 Lambda; both directions are one, and their masking is correlated
@@ -121,7 +121,8 @@ def lobe(cosine: np.ndarray, roughness: float) -> np.ndarray:
 
 
 def _observed(frame: Lit, surface: Unfolded) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What a frame shows of each texel: its unshaded colour [S, S, 3], n.l [S, S], and how far that counts [S, S]."""
+    """Return what a frame shows of each texel: its unshaded colour [S, S, 3], n.l [S, S], and how far that counts [S,
+    S]."""
     seen = observe(frame.view, hold(frame.unshaded), surface, 1.0)
     burnt = cv2.dilate((images.linear_to_srgb(frame.linear).max(-1) > BURNT).astype(np.uint8), np.ones((5, 5))).astype(
         np.float32
@@ -136,7 +137,7 @@ def _observed(frame: Lit, surface: Unfolded) -> tuple[np.ndarray, np.ndarray, np
 
 
 def _fit(samples: list[tuple], roughness: float) -> tuple[np.ndarray, float]:
-    """The strength [S, S, 3] for one roughness, and the sum of squares that it leaves."""
+    """Return the strength [S, S, 3] for one roughness, and the sum of squares that it leaves."""
     lobes = [lobe(cosine, roughness)[..., None].astype(np.float32) for _, cosine, _ in samples]
     weights = [weight[..., None] for *_, weight in samples]
     total = sum(weights) + 1e-6

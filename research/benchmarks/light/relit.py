@@ -134,14 +134,14 @@ class RelitSubject:
     seed: int
 
     def worn(self) -> Worn:
-        """The true maps on the capture's head."""
+        """Return the true maps on the capture's head."""
         head = subject_mesh(self.seed)
         pose, *_ = pose_of_truth(self.capture, self.truth)
         return worn_by(self.capture, read_worn(self.maps), head.moved(pose.apply(head.vertices)))
 
 
 def _subjects(arguments: argparse.Namespace, work: Path) -> Iterator[RelitSubject]:
-    """Each subject that was asked for and has been solved."""
+    """Return each subject that was asked for and has been solved."""
     if arguments.sample:
         maps = work / "sample_truth"
         if not (maps / "normal.png").exists():  # written last
@@ -158,7 +158,7 @@ def _subjects(arguments: argparse.Namespace, work: Path) -> Iterator[RelitSubjec
 
 
 def render_rows(subject: RelitSubject, work: Path, lights: list[str], row_names: list[str]) -> None:
-    """Renders the pictures that are not newer than what they show.
+    """Render the pictures that are not newer than what they show.
 
     subject: with maps of its own and the true ones; work: takes renders/ROW_LIGHT.exr and face.exr; lights: presets,
     and pictures of surroundings; row_names: of the rows, besides the truth."""
@@ -205,8 +205,8 @@ def render_rows(subject: RelitSubject, work: Path, lights: list[str], row_names:
 
 
 def is_newer(picture: Path, capture: Capture, truth: Path) -> bool:
-    """Whether a render is there and was made after all that it shows: the capture's maps, its textures and head, and
-    the true maps."""
+    """Return whether a render is there and was made after all that it shows: the capture's maps, its textures and head,
+    and the true maps."""
     shown = [
         path for folder in (capture.maps, capture.maps_4k, truth) if folder.is_dir() for path in folder.glob("*.png")
     ]
@@ -232,8 +232,8 @@ def score(work: Path, lights: list[str], rows: list[str] = ROWS) -> dict[str, di
 
 
 def exposure(truth: np.ndarray, face: np.ndarray) -> float:
-    """The gain that brings the mean luminance of a linear picture [H, W, 3] over the pixels `face` bool [H, W] to
-    MIDDLE."""
+    """Return the gain that brings the mean luminance of a linear picture [H, W, 3] over the pixels `face` bool [H, W]
+    to MIDDLE."""
     return MIDDLE / float((truth[face] @ LUMINANCE).mean())
 
 
@@ -267,7 +267,7 @@ def mean_over_lights(figures_by_light: dict[str, dict[str, dict]]) -> dict[str, 
 
 
 def shortfall(rows: dict[str, dict[str, float]]) -> str:
-    """What is missing to what is asked for, in words; empty where nothing is."""
+    """Return what is missing to what is asked for, in words; empty where nothing is."""
     gains = {row: rows["solved"]["psnr"] - rows[row]["psnr"] for row in ("raw", "delit")}
     return ", ".join(
         f"{gains[row]:+.2f} dB over {row} where {asked:.1f} is asked for"
@@ -277,7 +277,7 @@ def shortfall(rows: dict[str, dict[str, float]]) -> str:
 
 
 def with_mean(results: dict[str, dict[str, dict[str, float]]]) -> dict[str, dict[str, dict[str, float]]]:
-    """The same and, where there are several people of research/benchmarks/captures/people.py, their mean."""
+    """Return the same and, where there are several people of research/benchmarks/captures/people.py, their mean."""
     people = [results[person.name] for person in PEOPLE if person.name in results]
     if len(people) < 2:
         return dict(results)

@@ -47,7 +47,7 @@ class Worn:
 
 
 def make_rows(raw: np.ndarray, delit: np.ndarray, solved: Worn, true: Worn, skin: np.ndarray) -> dict[str, Worn]:
-    """The table's rows, whose albedos share one mean.
+    """Return the table's rows, whose albedos share one mean.
 
     raw, delit: textures, linear [S, S, 3]; solved, true: maps; skin: [S, S], weight of the texels of that mean. Returns
     Name -> maps."""
@@ -71,13 +71,13 @@ def make_rows(raw: np.ndarray, delit: np.ndarray, solved: Worn, true: Worn, skin
 
 
 def toned(texture: np.ndarray, tone: np.ndarray, skin: np.ndarray) -> np.ndarray:
-    """A texture [S, S, 3] times the gain per channel that gives it the linear mean `tone` [3] over the texels of `skin`
-    [S, S]."""
+    """Return a texture [S, S, 3] times the gain per channel that gives it the linear mean `tone` [3] over the texels of
+    `skin` [S, S]."""
     return np.clip(texture * (tone * skin.sum() / (texture * skin[..., None]).sum((0, 1))), 0, 1).astype(np.float32)
 
 
 def read_worn(folder: Path, size: int = SIZE) -> Worn:
-    """A folder of maps, averaged to `size`."""
+    """Return a folder of maps, averaged to `size`."""
     normal = _sized(images.read_data(folder / "normal.png")[..., :3] * 2 - 1, size)
     return Worn(
         _sized(images.read_linear(folder / "diffuse_albedo.png"), size),
@@ -87,8 +87,8 @@ def read_worn(folder: Path, size: int = SIZE) -> Worn:
 
 
 def worn_by(capture: Capture, true: Worn, subject: Mesh) -> Worn:
-    """The true maps on the capture's head: each texel shows what lies nearest on the subject [m, in the capture's
-    world], and its own where nothing does within FARTHEST_M."""
+    """Return the true maps on the capture's head: each texel shows what lies nearest on the subject [m, in the
+    capture's world], and its own where nothing does within FARTHEST_M."""
     at = places(read_head(capture).mesh, (0, 0), Source(subject), len(true.specular), FARTHEST_M, lambda share: None)
 
     def carried(baked: np.ndarray, own: np.ndarray) -> np.ndarray:

@@ -134,7 +134,7 @@ def main() -> None:
 
 
 def solve_all(options: argparse.Namespace, done: dict) -> None:
-    """Fills `done` with the solves that are missing and stores it after each problem."""
+    """Fill `done` with the solves that are missing and stores it after each problem."""
     subjects = [*options.subjects, *(_held_out(options.skins) if options.skins else [])]
     tasks = []
     for i, subject in enumerate(subjects):
@@ -157,8 +157,8 @@ def solve_all(options: argparse.Namespace, done: dict) -> None:
 
 
 def _belongs(row: str, subject: int, shadows: int, seed: int) -> bool:
-    """Whether a row is solved on a problem: key rows on all, others on one shadow per subject, the 600 steps on one
-    problem each; two seeds of the first."""
+    """Return whether a row is solved on a problem: key rows on all, others on one shadow per subject, the 600 steps on
+    one problem each; two seeds of the first."""
     if seed and row != FULL:
         return False
     if row in NAMED:
@@ -190,7 +190,7 @@ def _solve_problem(subject: str, shadows: str, solves: list[tuple[str, int]], op
 
 
 def solve_row(uv_problem: MaskedUvProblem, row: str, seed: int, steps: int) -> np.ndarray:
-    """Solves a problem by one row's method, which is told the true skin tone.
+    """Solve a problem by one row's method, which is told the true skin tone.
 
     uv_problem: solved; row: a key of ROWS; seed: of the noise; steps: of every row that does not say otherwise. Returns
     The albedo, linear [S, S, 3]."""
@@ -210,7 +210,7 @@ def solve_problem(
     mask: str = "painted",
     with_prior: bool = True,
 ) -> np.ndarray:
-    """Solves a problem under a recipe and a requested tone.
+    """Solve a problem under a recipe and a requested tone.
 
     uv_problem: solved; recipe: of the solve; tone: of the skin; seed: of the noise; cells: of V across the face; mask:
     what becomes of M: "painted", "empty" or "full"; with_prior: False: the texels follow the loss alone. Returns The

@@ -27,7 +27,7 @@ TITLES = {"ssim": "SSIM", "flip": "FLIP", "features": "features"}
 def measure_regions(
     albedo: np.ndarray, truth: np.ndarray, face: np.ndarray, regions: dict[str, np.ndarray]
 ) -> dict[str, dict[str, float]]:
-    """Compares an albedo with the truth in sRGB, after the gain per channel (linear) that is best for the whole face.
+    """Compare an albedo with the truth in sRGB, after the gain per channel (linear) that is best for the whole face.
 
     albedo, truth: linear [S, S, 3]; face: bool [S, S]; regions: name -> bool [S, S]. Returns Region -> figures: PSNR in
     dB, SSIM, FLIP and the feature distance (where its network is installed)."""
@@ -136,7 +136,7 @@ def table(figures: dict[str, dict]) -> str:
 
 
 def _compared(distance: float, spread: float | None) -> str:
-    """How far a row is from the first, in dB, and whether that is within the spread."""
+    """Return how far a row is from the first, in dB, and whether that is within the spread."""
     return f"{distance:+.2f}" + (" (tie)" if spread is not None and abs(distance) < spread else "")
 
 

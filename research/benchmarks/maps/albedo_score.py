@@ -53,7 +53,7 @@ class AlbedoTruth:
 
 
 def read_truth(folder: Path) -> list[AlbedoTruth]:
-    """The frames of a truth folder. Raises Problem when there are none."""
+    """Return the frames of a truth folder. Raises Problem when there are none."""
     frames = []
     for path in sorted((folder / "albedo").glob("*.png")):
         shadow = folder / "shadow" / path.name
@@ -80,7 +80,7 @@ class HeadInView:
     uv: np.ndarray
 
     def picture(self, albedo: np.ndarray) -> np.ndarray:
-        """A map [S, S, 3] in the head's UVs as this view sees it, [H, W, 3]; black beside the head."""
+        """Return a map [S, S, 3] in the head's UVs as this view sees it, [H, W, 3]; black beside the head."""
         picture = np.zeros((*self.hit.shape, 3), np.float32)
         picture[self.hit] = raster.sample(albedo, np.stack([self.uv[:, 0], 1 - self.uv[:, 1]], 1) * len(albedo))
         return picture
@@ -96,14 +96,14 @@ def score_capture(capture: Capture, truth: Path) -> dict:
 
 
 def averaged(albedo: np.ndarray) -> np.ndarray:
-    """A map, sRGB [S, S, 3], averaged in linear light to FINEST texels a side where it has more."""
+    """Return a map, sRGB [S, S, 3], averaged in linear light to FINEST texels a side where it has more."""
     if len(albedo) <= FINEST:
         return albedo
     return images.linear_to_srgb(images.resize(images.srgb_to_linear(albedo), FINEST, FINEST).clip(0, 1))
 
 
 def looks(capture: Capture, truth: Path) -> tuple[list[HeadInView], list[int]]:
-    """The registered frames with truth as they see the capture's head, and the numbers of those that were not
+    """Return the registered frames with truth as they see the capture's head, and the numbers of those that were not
     registered. Raises Problem where none was."""
     whole = read_head(capture)
     head, caster = whole.mesh, whole.caster
@@ -125,14 +125,14 @@ def looks(capture: Capture, truth: Path) -> tuple[list[HeadInView], list[int]]:
 
 
 def score_map(albedo: np.ndarray, looks: list[HeadInView]) -> dict:
-    """The figures of an albedo map, sRGB [S, S, 3], in the UVs of the head that `looks` sees."""
+    """Return the figures of an albedo map, sRGB [S, S, 3], in the UVs of the head that `looks` sees."""
     results = [compare(look.picture(albedo), look.true, look.true.face & look.hit) for look in looks]
     coverage = [(look.hit & look.true.face).sum() / look.true.face.sum() for look in looks]
     return {"views": len(results), "face_coverage": float(np.mean(coverage)), **mean_scores(results)}
 
 
 def score_floors(truth: Path) -> dict:
-    """What has to be beaten: the raw video taken for albedo, and the true mean skin colour everywhere."""
+    """Return what has to be beaten: the raw video taken for albedo, and the true mean skin colour everywhere."""
     frames = {true.frame: true for true in read_truth(truth)}
     raw, flat = [], []
     for number, image in enumerate(read_film(truth / "capture.mp4")):
@@ -159,7 +159,7 @@ def compare(predicted: np.ndarray, true: AlbedoTruth, mask: np.ndarray) -> dict:
 
 
 def mean_scores(results: list[dict]) -> dict:
-    """The mean over frames of what `compare` gives."""
+    """Return the mean over frames of what `compare` gives."""
     figures = {
         kind: {name: float(np.mean([r[kind][name] for r in results])) for name in results[0][kind]}
         for kind in ("raw", "gain")

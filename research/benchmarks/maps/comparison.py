@@ -80,36 +80,39 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=512)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--json", type=Path)
-    asked = parser.parse_args()
-    folder = asked.folder.resolve()
-    subjects = {name: (folder / f"{name}.wildcap", folder / name) for name in asked.only}
-    if asked.scan:
-        subjects["scan"] = tuple(path.resolve() for path in asked.scan)
+    options = parser.parse_args()
+    folder = options.folder.resolve()
+    subjects = {name: (folder / f"{name}.wildcap", folder / name) for name in options.only}
+    if options.scan:
+        subjects["scan"] = tuple(path.resolve() for path in options.scan)
     found = {}
-    with ProcessPoolExecutor(asked.jobs, get_context("spawn")) as pool:
+    with ProcessPoolExecutor(options.jobs, get_context("spawn")) as pool:
         running = {
-            pool.submit(compare_methods, *paths, folder / "comparison" / name, asked.size): name
+            pool.submit(compare_methods, *paths, folder / "comparison" / name, options.size): name
             for name, paths in subjects.items()
         }
         for future in as_completed(running):
             found[running[future]] = future.result()
             print(f"{running[future]} compared", flush=True)
-    found = {"size": asked.size, "subjects": {name: found[name] for name in subjects}}
+    found = {"size": options.size, "subjects": {name: found[name] for name in subjects}}
     found |= (
         {"people": means([rows for name, rows in found["subjects"].items() if name != "scan"])}
         if set(found["subjects"]) - {"scan"}
         else {}
     )
     found |= {"scan": means([found["subjects"]["scan"]])} if "scan" in subjects else {}
-    if asked.json:
+    if options.json:
         figures.write_record(
-            asked.json, "comparison", "python -m research.benchmarks.maps.comparison FOLDER --scan CAPTURE TRUTH", found
+            options.json,
+            "comparison",
+            "python -m research.benchmarks.maps.comparison FOLDER --scan CAPTURE TRUTH",
+            found,
         )
     print(f"{table(found)}\n\n{paired_table(found['subjects'])}")
 
 
 def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[str, dict]:
-    """Scores all methods on one subject.
+    """Score all methods on one subject.
 
     source: a capture with texture and mask; truth: folder of the true albedo, and of the tone that all are given; work:
     takes each row's maps and scores; what is there is not solved again; size: of the maps, texels along a side. Returns
@@ -138,7 +141,7 @@ def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[st
 
 
 def find_row_folder(work: Path, input_name: str, method: str, seed: int = 0) -> Path:
-    """Where a row's diffuse_albedo.exr, shading.exr and score.json lie.
+    """Return where a row's diffuse_albedo.exr, shading.exr and score.json lie.
 
     work: folder of a subject's rows; input_name: one of INPUTS; method: one of METHODS; seed: of the noise."""
     return work / f"{input_name}_{method.replace(', ', '_').replace(' ', '_')}_{seed}"
@@ -147,7 +150,7 @@ def find_row_folder(work: Path, input_name: str, method: str, seed: int = 0) -> 
 def solve_by_method(
     capture: Capture, settings: Settings, method: str, seed: int
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Solves a capture by one method.
+    """Solve a capture by one method.
 
     capture: with texture and mask; settings: of the solve; method: one of METHODS; seed: of the noise. Returns Diffuse
     albedo and shading, linear [S, S, 3], and the seconds that it took."""
@@ -182,7 +185,7 @@ def solve_by_method(
 
 
 def _by_hand(capture: Capture, evidence: Evidence, settings: Settings, method: str) -> tuple[np.ndarray, np.ndarray]:
-    """The texture, or the texture over its own blur, brought to the skin tone; and what it was divided by."""
+    """Return the texture, or the texture over its own blur, brought to the skin tone; and what it was divided by."""
     size, weight = evidence.size, evidence.weight.numpy()[..., None]
     texture = np.maximum(images.resize(images.read_linear(capture.texture), size, size), 0)
     shading = np.ones_like(texture)
@@ -206,8 +209,8 @@ def _keep(row: Path, diffuse: np.ndarray, shading: np.ndarray, seconds: float, l
 
 
 def _raw(source: Capture, folder: Path, settings: Settings) -> Capture:
-    """A copy of a capture whose texture is the frames' as filmed, with the mask that the chain proposes for it; made
-    once."""
+    """Return a copy of a capture whose texture is the frames' as filmed, with the mask that the chain proposes for it;
+    made once."""
     copy = Capture(folder)
     if not copy.shadow_mask_auto.is_file():
         shutil.rmtree(folder, ignore_errors=True)

@@ -97,7 +97,7 @@ def read_errors(filmed: Filmed) -> Errors:
 
 
 def measure(captures: dict[str, Errors]) -> dict:
-    """The table's scores, the captures' rows, and the deviations that all of them make most likely."""
+    """Return the table's scores, the captures' rows, and the deviations that all of them make most likely."""
     shipped = np.array([getattr(confidence, name) for name in DEVIATIONS])
     people = sorted({each.person for each in captures.values()})
     others = (

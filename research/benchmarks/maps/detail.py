@@ -48,7 +48,7 @@ class FaceRays:
 
 
 def cast_face_rays(caster: raster.RayCaster, view: View, true: AlbedoTruth, margin: int = 41) -> FaceRays:
-    """A view's rays into the head around the face.
+    """Return a view's rays into the head around the face.
 
     caster: of the head, in the view's world; view: the camera; true: the view's truth, of any size; margin: pixels of
     the truth around its face."""
@@ -74,8 +74,8 @@ def cast_face_rays(caster: raster.RayCaster, view: View, true: AlbedoTruth, marg
 
 
 def centre_rays(rays: FaceRays, texture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The map sRGB [S, S, 3] by one ray per pixel, as albedo_score renders it: sRGB [h, w, 3] and the pixels that
-    hit."""
+    """Return the map sRGB [S, S, 3] by one ray per pixel, as albedo_score renders it: sRGB [h, w, 3] and the pixels
+    that hit."""
     at, hit = (x[RAYS // 2 :: RAYS, RAYS // 2 :: RAYS] for x in (rays.at, rays.hit))
     return raster.sample(texture, at.reshape(-1, 2) * len(texture)).reshape(*hit.shape, 3) * hit[..., None], hit
 
@@ -130,7 +130,7 @@ def mean_of(frames: list[dict | None]) -> dict:
 
 
 def _shrunk(fine: np.ndarray) -> np.ndarray:
-    """The mean over each pixel's rays."""
+    """Return the mean over each pixel's rays."""
     return images.resize(fine, fine.shape[1] // RAYS, fine.shape[0] // RAYS)
 
 

@@ -64,7 +64,7 @@ class RegionShader:
 
 
 def light_by_regions(start: Start, recipe: Recipe, count: int, seed: int = 0):
-    """Puts soft regions with a light each in place of the grid; they begin as clusters of place and lightness on the
+    """Put soft regions with a light each in place of the grid; they begin as clusters of place and lightness on the
     face.
 
     start: begun from; recipe: of the solve; count: K, of the regions; seed: of the clusters. Returns The start, the

@@ -127,13 +127,13 @@ def show_samples(options: argparse.Namespace) -> None:
 
 
 def card_of(weights: Path) -> dict:
-    """The weights' card."""
+    """Return the weights' card."""
     return json.loads(weights.with_suffix(".json").read_text(encoding="utf-8"))
 
 
 @torch.no_grad()
 def draw_from_prior(prior: Prior, coords: torch.Tensor, tone: torch.Tensor, steps: int) -> torch.Tensor:
-    """Draws maps from the prior alone.
+    """Draw maps from the prior alone.
 
     prior: loaded; coords: [N, 2, P, P], where the windows lie; tone: [N, 3], linear, of the skins; steps: of the whole
     noise schedule. Returns [N, 7, P, P] in the network's range."""
@@ -202,14 +202,14 @@ def measure_response(options: argparse.Namespace) -> None:
 
 
 def reflectance(seed: int, size: int) -> torch.Tensor:
-    """A synthetic subject's map [7, S, S]."""
+    """Return a synthetic subject's map [7, S, S]."""
     made = make_skin(seed, size)
     channels = [2 * made.diffuse - 1, made.normal, 2 * made.specular[..., None] - 1]
     return torch.from_numpy(np.concatenate(channels, -1).transpose(2, 0, 1).copy())
 
 
 def of_subject(prior: Prior, truth: torch.Tensor) -> ConditionedPrior:
-    """The prior told the mean albedo of the skin of a map [7, S, S]."""
+    """Return the prior told the mean albedo of the skin of a map [7, S, S]."""
     skin = torch.from_numpy(template.mask("skin", truth.shape[-1]) * (1 - template.mask("eyes", truth.shape[-1])))
     return prior.of_tone(SkinTone.from_linear(((truth[:3] + 1) / 2 * skin).sum((1, 2)) / skin.sum(), GIVEN).tensor)
 
@@ -217,7 +217,7 @@ def of_subject(prior: Prior, truth: torch.Tensor) -> ConditionedPrior:
 def sample_given_diffuse(
     prior: ConditionedPrior, truth: torch.Tensor, steps: int, guidance: str = "dps"
 ) -> torch.Tensor:
-    """The map that the solver samples under even light where the texture is the true albedo.
+    """Return the map that the solver samples under even light where the texture is the true albedo.
 
     prior: conditioned on the skin's tone; truth: [7, S, S] in the network's range; steps: of the sampling; guidance:
     "dps" or "proximal". Returns [7, S, S], likewise."""

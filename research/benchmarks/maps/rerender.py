@@ -56,12 +56,12 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
     parser.add_argument("--json", type=Path)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     people = {}
-    for name in asked.only:
-        views = delit_views(Capture(asked.folder / f"{name}.wildcap"))
+    for name in options.only:
+        views = delit_views(Capture(options.folder / f"{name}.wildcap"))
         people[name] = {
-            row: score(rendering(asked.folder / "comparison" / name, row), views) for row in (*ROWS, CEILING)
+            row: score(rendering(options.folder / "comparison" / name, row), views) for row in (*ROWS, CEILING)
         }
         print(name, json.dumps(people[name]), flush=True)
     found = {
@@ -71,13 +71,13 @@ def main() -> None:
             for row, cells in next(iter(people.values())).items()
         },
     }
-    if asked.json:
-        figures.write_record(asked.json, "rerender", "python -m research.benchmarks.maps.rerender FOLDER", found)
+    if options.json:
+        figures.write_record(options.json, "rerender", "python -m research.benchmarks.maps.rerender FOLDER", found)
     print(table(found))
 
 
 def delit_views(capture: Capture) -> list[DelitFrame]:
-    """The frames that were delit, with the facial skin that each of them sees from the front."""
+    """Return the frames that were delit, with the facial skin that each of them sees from the front."""
     head = meshes.read_obj(capture.head)
     caster, normals = raster.RayCaster(head), meshes.vertex_normals(head)
     skin = template.mask("skin", 512) * template.mask("face", 512) * (1 - template.mask("eyes", 512))

@@ -100,17 +100,17 @@ def main() -> int:
         help="draw the parts of the first capture instead of measuring; of synthetic people only in the docs",
     )
     parser.add_argument("--json", type=Path)
-    asked = parser.parse_args()
-    captures = captures_asked(parser, asked)
-    if asked.picture:
-        images.write_srgb(asked.picture, parts_side_by_side(captures[0]))
+    options = parser.parse_args()
+    captures = captures_asked(parser, options)
+    if options.picture:
+        images.write_srgb(options.picture, parts_side_by_side(captures[0]))
         return 0
-    beside = dict(pair.split("=", 1) for pair in asked.beside)
+    beside = dict(pair.split("=", 1) for pair in options.beside)
     scores, by_capture, scales = measure(captures, {name: Path(path) for name, path in beside.items()})
     record = {**to_record(summarise(scores, COLUMNS, DELIT), scores), "captures": by_capture, "scales": scales}
     print("\n\n".join(f"{heading}\n\n{body}" for heading, body in sections(record)))
-    if asked.json:
-        figures.write_record(asked.json, "split", COMMAND, record)
+    if options.json:
+        figures.write_record(options.json, "split", COMMAND, record)
     return 0
 
 
@@ -168,7 +168,7 @@ prior = cache(load)
 
 
 def shapes_of(filmed: Filmed) -> split.Shapes:
-    """What the solver would split of a capture, with the true tone."""
+    """Return what the solver would split of a capture, with the true tone."""
     evidence = read_evidence(filmed.capture, read_filmed_head(filmed.capture), SIZE)
     tone = read_given_tone(people.skin_tone(filmed.truth))
     if tone is None:
@@ -177,7 +177,7 @@ def shapes_of(filmed: Filmed) -> split.Shapes:
 
 
 def divided(shapes: split.Shapes, fitted: split.Split, local: bool) -> np.ndarray:
-    """The delit texture [SIZE, SIZE, 3], linear, over the light that was found, at any exposure."""
+    """Return the delit texture [SIZE, SIZE, 3], linear, over the light that was found, at any exposure."""
     light = fitted.light(shapes.normal)
     if local:
         light = light * split.enlarge_field(torch.from_numpy(fitted.local), SIZE).exp()

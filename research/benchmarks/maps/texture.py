@@ -43,7 +43,7 @@ STEPS, SIZE, LEFT_OUT = 150, 1024, 4
 
 
 def measure_rows(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS) -> dict:
-    """Scores the textures of a capture.
+    """Score the textures of a capture.
 
     Raises Problem: Where the capture is not registered or no true frame belongs to it."""
     if not capture.head.is_file():
@@ -95,7 +95,7 @@ def _row(row: str, observations: list, surface, looks: dict[str, FaceRays]) -> d
 
 
 def _texture(row: str, observations: list, surface) -> np.ndarray:
-    """A row's map, sRGB [S, S, 3]. The observations are used up."""
+    """Return a row's map, sRGB [S, S, 3]. The observations are used up."""
     if row == "average":
         linear = weighted_mean([np.exp(o.log_colour) for o in observations], [o.weight for o in observations])
         seen = 1 - np.prod([1 - o.quality for o in observations], axis=0)
@@ -127,7 +127,7 @@ def score(map_: np.ndarray, frames: Iterable[FaceRays]) -> dict:
 
 
 def _leave_one_out(observations: list, surface, looks: dict[str, FaceRays]) -> dict:
-    """The aligned texture without one view, scored in that view alone; LEFT_OUT views in turn, evenly spread."""
+    """Return the aligned texture without one view, scored in that view alone; LEFT_OUT views in turn, evenly spread."""
     names = [o.name for o in observations if o.name in looks]
     chosen = [names[i] for i in np.unique(np.linspace(1, max(len(names) - 2, 1), LEFT_OUT).round().astype(int))]
     frames = {

@@ -41,15 +41,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("skins", type=Path)
     parser.add_argument("--json", type=Path)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     mean = load().mean_face
     record = {
-        PAINTED: measure(read_shapes(asked.skins)),
-        UNLIT: measure(read_shapes(asked.skins, lambda skin: unshaded(skin, mean))),
+        PAINTED: measure(read_shapes(options.skins)),
+        UNLIT: measure(read_shapes(options.skins, lambda skin: unshaded(skin, mean))),
     }
     print("\n\n".join(body for _, body in sections(record)))
-    if asked.json:
-        figures.write_record(asked.json, "traits", COMMAND, record)
+    if options.json:
+        figures.write_record(options.json, "traits", COMMAND, record)
     return 0
 
 
@@ -91,7 +91,7 @@ def z_scores(found: LargeShapes) -> np.ndarray:
 
 
 def correlation_by_distance(product: np.ndarray, apart_mm: np.ndarray) -> dict[str, float]:
-    """The mean of products [..., N] of pairs, over the variance, by their distance [N]."""
+    """Return the mean of products [..., N] of pairs, over the variance, by their distance [N]."""
     return {
         f"{low} to {high} mm": round(float(np.nanmean(product[..., (apart_mm >= low) & (apart_mm < high)])), 3)
         for low, high in zip(BINS_MM, BINS_MM[1:], strict=False)

@@ -172,7 +172,8 @@ def _enlarged(small: np.ndarray, method: str) -> np.ndarray:
 
 
 def _closeup(small: np.ndarray, results: dict[str, np.ndarray], true: np.ndarray, side: int = 176) -> np.ndarray:
-    """The small map, each method and the truth side by side, diffuse above normals, where the truth has most detail."""
+    """Return the small map, each method and the truth side by side, diffuse above normals, where the truth has most
+    detail."""
     log = cv2.GaussianBlur(np.abs(cv2.Laplacian(true[..., 1], cv2.CV_32F)), (0, 0), side / 4)[side:-side, side:-side]
     row, column = (int(at) + side // 2 for at in np.unravel_index(log.argmax(), log.shape))
     nearest = np.repeat(np.repeat(np.moveaxis(small, 0, -1), FACTOR, 0), FACTOR, 1)
@@ -205,8 +206,8 @@ def from_frames(work: Path) -> dict[str, dict[str, float]]:
 
 
 def filmed(seed: int, folder: Path) -> tuple[Capture, np.ndarray]:
-    """A capture of a reserved subject in even light, with its texture made, and its true albedo, sRGB [2048, 2048, 3].
-    Made once."""
+    """Return a capture of a reserved subject in even light, with its texture made, and its true albedo, sRGB [2048,
+    2048, 3]. Made once."""
     capture = Capture(folder)
     if not (capture.root / "truth.png").is_file():
         mesh, rng = subject_mesh(seed), np.random.default_rng([seed, 50])
@@ -224,8 +225,8 @@ def filmed(seed: int, folder: Path) -> tuple[Capture, np.ndarray]:
 
 
 def _stacked(srgb: np.ndarray) -> np.ndarray:
-    """The network's channels of an albedo at 2048 on smooth skin, at 4096, of which a solver's map is a quarter: [7,
-    4096, 4096]."""
+    """Return the network's channels of an albedo at 2048 on smooth skin, at 4096, of which a solver's map is a quarter:
+    [7, 4096, 4096]."""
     maps = np.zeros((CHANNELS, 4096, 4096), np.float32)
     maps[:3] = srgb.repeat(2, 0).repeat(2, 1).transpose(2, 0, 1)
     maps[5], maps[6] = 1, 0.35

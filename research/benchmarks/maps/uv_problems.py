@@ -66,7 +66,7 @@ class MaskedUvProblem:
 
     @property
     def tone(self) -> SkinTone:
-        """The true skin's, eyes left out."""
+        """Return the true skin's, eyes left out."""
         skin = skin_weight(len(self.albedo))
         return SkinTone.from_linear((self.albedo * skin[..., None]).sum((0, 1)) / skin.sum(), GIVEN)
 
@@ -90,7 +90,7 @@ class MaskedUvProblem:
 
 
 def make_problem(subject: str, shadows: str, size: int, kind: str = "raw") -> MaskedUvProblem:
-    """A problem; the same arguments give the same one.
+    """Return a problem; the same arguments give the same one.
 
     subject: a seed of research/people, "lee_perry_smith", or the path of a skin in our UVs (sRGB); shadows: a key of
     SHADOWS; size: texels along a side; kind: "raw", or "delit", with little of the light left."""
@@ -108,7 +108,7 @@ def make_problem(subject: str, shadows: str, size: int, kind: str = "raw") -> Ma
 
 
 def make_plain_problem(seed: int, shadows: str, size: int) -> MaskedUvProblem:
-    """A subject of research/people in a random light of that seed; `shadows`: self, leaves, blinds or edge."""
+    """Return a subject of research/people in a random light of that seed; `shadows`: self, leaves, blinds or edge."""
     rng, albedo = np.random.default_rng([seed, 7]), albedo_of(str(seed), size)
     shading, shadow, _ = bake(template.load(), size, random_light(rng), shadows, rng)
     covered = raster.rasterize_uv(template.load(), size)[0] >= 0
@@ -132,8 +132,8 @@ def albedo_of(subject: str, size: int) -> np.ndarray:
 
 
 def lee_perry_smith() -> Path:
-    """The scan's colour map in our UVs, carried there once and kept outside of this repository (the scan is CC BY and
-    no part of it)."""
+    """Return the scan's colour map in our UVs, carried there once and kept outside of this repository (the scan is CC
+    BY and no part of it)."""
     out = CACHE / "lee_perry_smith"
     if not (out / "carried.json").is_file():
         scan = trimesh.load(LEE_PERRY_SMITH / "LeePerrySmith.glb").geometry["LeePerrySmith"]
@@ -152,8 +152,8 @@ def lee_perry_smith() -> Path:
 
 
 def _chosen_light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The first usable one of the random lights; kept in CACHE under a name that changes with the sources it comes
-    from."""
+    """Return the first usable one of the random lights; kept in CACHE under a name that changes with the sources it
+    comes from."""
     sources = b"".join(Path(module).read_bytes() for module in (__file__, light.__file__))
     key = hashlib.blake2b(repr((shadows, seeds, size)).encode() + sources, digest_size=12).hexdigest()
     stored = CACHE / f"light_{key}.npz"
@@ -167,8 +167,8 @@ def _chosen_light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.n
 
 
 def _light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A random light: shading without cast shadows [S, S, 3], the share of it that these leave [S, S, 3], and the
-    blocked share of the sun [S, S]."""
+    """Return a random light: shading without cast shadows [S, S, 3], the share of it that these leave [S, S, 3], and
+    the blocked share of the sun [S, S]."""
     thrown_by, radius = SHADOWS[shadows]
     rng = np.random.default_rng(seeds)
     drawn = replace(random_light(rng), radius=radius)
@@ -195,7 +195,7 @@ def _usable(shading: np.ndarray, kept: np.ndarray, shadow: np.ndarray) -> bool:
 
 
 def _painted(shadow: np.ndarray) -> np.ndarray:
-    """The mask an artist would paint over a shadow: all of it and a little more."""
+    """Return the mask an artist would paint over a shadow: all of it and a little more."""
     return cv2.dilate((shadow > 0.08).astype(np.uint8), np.ones((9 * len(shadow) // 1024 | 1,) * 2, np.uint8)).astype(
         np.float32
     )

@@ -26,6 +26,6 @@ def disagreement(answers: list[np.ndarray], tone: np.ndarray) -> float | None:
 
 
 def agreement(answers: list[np.ndarray], tone: np.ndarray) -> float | None:
-    """The same in dB (PSNR of the mean squared difference)."""
+    """Return the same in dB (PSNR of the mean squared difference)."""
     found = disagreement(answers, tone)
     return None if found is None else to_decibels(found)

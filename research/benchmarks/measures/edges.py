@@ -56,7 +56,7 @@ def score_edges(
     height: float,
     lit: np.ndarray | None = None,
 ) -> EdgeScores:
-    """Measures what an answer leaves along the edges of a shadow.
+    """Measure what an answer leaves along the edges of a shadow.
 
     log, log_true: [H, W], natural logarithms of linear green of answer and truth; shadow: bool [H, W], the true one;
     mask: bool [H, W], pixels that count; height: the face's, in pixels; lit: bool [H, W], where along the edge the

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measures of one picture against its truth: PSNR, SSIM, FLIP, the pores' correlation, and what is left of a shadow's
+"""Measure of one picture against its truth: PSNR, SSIM, FLIP, the pores' correlation, and what is left of a shadow's
 step.
 
 Pictures are sRGB float32 [H, W, 3] in [0, 1], masks bool [H, W]. The gain per channel, in linear light, takes out what
@@ -59,7 +59,7 @@ def detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray) -> float:
 
 
 def fine_bands(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-    """What the two vary by between 1 and 3 px, [H, W] each, and where nothing from off the mask is in it, bool
+    """Return what the two vary by between 1 and 3 px, [H, W] each, and where nothing from off the mask is in it, bool
     [H, W]."""
     fine = []
     for picture in (log, log_true):
@@ -81,6 +81,6 @@ def shadow_step(residual: np.ndarray, mask: np.ndarray, shadow: np.ndarray) -> f
 
 
 def edge_bands(shadow: np.ndarray) -> list[np.ndarray]:
-    """The pixels 4 to 12 px from the edge of a shadow, bool [H, W]: on the lit side and on the dark one."""
+    """Return the pixels 4 to 12 px from the edge of a shadow, bool [H, W]: on the lit side and on the dark one."""
     distances = [cv2.distanceTransform(side.astype(np.uint8), cv2.DIST_L2, 5) for side in (~shadow, shadow)]
     return [(distance > 4) & (distance < 12) for distance in distances]

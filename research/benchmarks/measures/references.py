@@ -20,7 +20,7 @@ DARKEST = 1e-3
 
 
 def flat_colour(filmed: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """The filmed picture's mean over the pixels bool [H, W], everywhere; linear [H, W, 3]."""
+    """Return the filmed picture's mean over the pixels bool [H, W], everywhere; linear [H, W, 3]."""
     return np.broadcast_to(filmed[mask].mean(0), filmed.shape).astype(np.float32)
 
 

@@ -66,5 +66,5 @@ def fit_light(ratios: list[np.ndarray], normals: list[np.ndarray]) -> SharedLigh
 
 
 def without_light(answer: np.ndarray, normals: np.ndarray, light: SharedLight) -> np.ndarray:
-    """An answer, linear [N, 3], over the light at its normals [N, 3]."""
+    """Return an answer, linear [N, 3], over the light at its normals [N, 3]."""
     return answer / np.exp(sh_basis(np.asarray(normals, np.float64)) @ light.coefficients)[:, None]

@@ -18,8 +18,8 @@ DARKEST = 1e-3
 def slope(
     answers: tuple[np.ndarray, np.ndarray], causes: tuple[np.ndarray, np.ndarray], mask: np.ndarray
 ) -> float | None:
-    """How far the change between two answers follows the change between their causes: least squares over the pixels
-    `mask` bool [H, W], all channels.
+    """Return how far the change between two answers follows the change between their causes: least squares over the
+    pixels `mask` bool [H, W], all channels.
 
     answers: two albedos; causes: the two true albedos, or the two pictures; linear [H, W, 3]. Changes are of
     logarithms, each channel about its mean, for a gain is not judged. None where the causes hardly differ (by less than

@@ -76,8 +76,8 @@ def standard_error(differences: list[float]) -> float | None:
 def format_table(
     summary: dict[str, dict[str, Cell]], columns: dict[str, Column], title: str, against: str | None = None
 ) -> str:
-    """A line per method: mean +- spread over people; with `against`, a second table of the paired differences +- their
-    standard errors. A column that nobody has is left out.
+    """Return a line per method: mean +- spread over people; with `against`, a second table of the paired differences +-
+    their standard errors. A column that nobody has is left out.
 
     summary: of `summarise`; columns: measure -> its column; title: heading of the methods; against: the method that
     `summary` has differences from. Returns Markdown."""
@@ -104,7 +104,7 @@ def format_table(
 
 
 def to_record(summary: dict[str, dict[str, Cell]], scores: Scores) -> dict:
-    """What figures.write_record takes: per method the cells, and every person's figures behind them."""
+    """Return what figures.write_record takes: per method the cells, and every person's figures behind them."""
     return {
         "summary": {
             method: {

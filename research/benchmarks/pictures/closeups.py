@@ -60,21 +60,21 @@ def run_closeups(module: str, description: str, shots: Shots, resolution: int, s
     parser.add_argument("--only", nargs="+", metavar="NAME", help="of the six people")
     parser.add_argument("--resolution", type=int, default=resolution, help="pixels of a picture's side")
     parser.add_argument("--samples", type=int, default=samples)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     from core.imaging import images
 
     from ..captures.people import PEOPLE
     from .gallery import write_small
 
     captures = [
-        prepare(asked.folder, person.name, person.seed)
+        prepare(options.folder, person.name, person.seed)
         for person in PEOPLE
-        if person.name in (asked.only or [person.name])
+        if person.name in (options.only or [person.name])
     ]
     rows = []
     # each in a process of its own: what EEVEE has compiled for one head, it does not give back
     for capture in captures:
-        words = [str(capture), str(asked.resolution), str(asked.samples)]
+        words = [str(capture), str(options.resolution), str(options.samples)]
         subprocess.run(
             [sys.executable, "-m", "research.benchmarks.pictures.closeups", f"research.benchmarks.{module}", *words],
             cwd=ROOT,
@@ -83,11 +83,12 @@ def run_closeups(module: str, description: str, shots: Shots, resolution: int, s
         rows.append(
             np.concatenate([images.read_srgb(capture / "renders" / f"{name}.png") for name in shots(capture.stem)], 1)
         )
-    write_small(asked.out, np.concatenate(rows))
+    write_small(options.out, np.concatenate(rows))
 
 
 def prepare(folder: Path, name: str, seed: int) -> Path:
-    """A capture with the true head and maps, and what the stage 4K Maps finds of its hair, made if it is not there."""
+    """Return a capture with the true head and maps, and what the stage 4K Maps finds of its hair, made if it is not
+    there."""
     from core.capture.capture import Capture
     from core.capture.messages import Reporter
     from core.face import template
@@ -118,7 +119,7 @@ def prepare(folder: Path, name: str, seed: int) -> Path:
 
 
 def render_closeups(root: Path, shots: dict[str, CloseUp], resolution: int, samples: int) -> None:
-    """Renders those close-ups of a capture that are not there yet.
+    """Render those close-ups of a capture that are not there yet.
 
     root: the capture's folder, which takes renders/NAME.png; shots: name -> what it shows; resolution: pixels of a
     side; samples: of Cycles."""
@@ -148,7 +149,7 @@ def render_closeups(root: Path, shots: dict[str, CloseUp], resolution: int, samp
 
 
 def shoot_closeup(obj, shot: CloseUp, resolution: int, samples: int, path: Path) -> None:
-    """Renders one close-up.
+    """Render one close-up.
 
     obj: the head, with the hair, eyes and mouth that the picture shows; shot: what it shows; resolution: pixels of a
     side; samples: of Cycles; EEVEE takes EEVEE_SAMPLES; path: of the PNG."""

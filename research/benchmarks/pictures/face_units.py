@@ -40,20 +40,20 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--resolution", type=int, default=320, help="pixels of a picture's side")
     parser.add_argument("--samples", type=int, default=32)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     from core.imaging import images
 
     with extension(), tempfile.TemporaryDirectory() as work:
         import bpy
         from bl_ext.user_default.wildcap.wildcap_addon.relight import headless
 
-        head, _ = headless.open_head(asked.capture)
+        head, _ = headless.open_head(options.capture)
         bpy.ops.wildcap.add_face_units()
         bpy.ops.wildcap.close_up()
         for name, shot in SHOTS.items():
-            shoot_closeup(head, shot, asked.resolution, asked.samples, Path(work) / f"{name}.png")
+            shoot_closeup(head, shot, options.resolution, options.samples, Path(work) / f"{name}.png")
         row = np.hstack([images.read_srgb(Path(work) / f"{name}.png")[..., :3] for name in SHOTS])
-    images.write_srgb(asked.out, row, quality=88)
+    images.write_srgb(options.out, row, quality=88)
 
 
 if __name__ == "__main__":

@@ -85,7 +85,7 @@ def solved(capture: Capture, truth: Path | None) -> list[np.ndarray]:
 
 
 def relit(capture: Capture) -> list[np.ndarray]:
-    """The head under LIGHTS, rendered where that is not done: sRGB, square."""
+    """Return the head under LIGHTS, rendered where that is not done: sRGB, square."""
     paths = [capture.renders / f"{Path(light).stem}.exr" for light in LIGHTS]
     made = max(
         path.stat().st_mtime
@@ -126,7 +126,7 @@ def face_square(view: View, head: meshes.Mesh) -> tuple[slice, slice]:
 
 
 def landmark_uv(index: int) -> np.ndarray:
-    """Where a landmark lies on a map of the built-in head: column and row [2] as shares of its side."""
+    """Return where a landmark lies on a map of the built-in head: column and row [2] as shares of its side."""
     face, bary = template.landmarks()
     head = template.load()
     u, v = (head.uvs[head.face_uvs[face[index]]] * bary[index][:, None]).sum(0)

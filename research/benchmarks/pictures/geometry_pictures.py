@@ -29,8 +29,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("capture", type=Path, help="reconstructed up to its texture, as `make demo` leaves it")
     parser.add_argument("out", type=Path)
-    asked = parser.parse_args()
-    write_small(asked.out, sheet(Capture(asked.capture)))
+    options = parser.parse_args()
+    write_small(options.out, sheet(Capture(options.capture)))
 
 
 def sheet(capture: Capture, views: int = 3) -> np.ndarray:

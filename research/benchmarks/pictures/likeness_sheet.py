@@ -51,7 +51,7 @@ def _shots(figure: Figure, work: Path) -> list[np.ndarray]:
 
 
 def _square(picture: np.ndarray) -> np.ndarray:
-    """The middle of a picture [H, W, 3] as one of SIDE x SIDE."""
+    """Return the middle of a picture [H, W, 3] as one of SIDE x SIDE."""
     side = min(picture.shape[:2])
     top, left = (picture.shape[0] - side) // 2, (picture.shape[1] - side) // 2
     return images.resize(picture[top : top + side, left : left + side, :3], SIDE, SIDE)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Renders a solved capture with Cycles through the installed extension's own functions, in a process of its own.
+"""Render a solved capture with Cycles through the installed extension's own functions, in a process of its own.
 
     python -m research.benchmarks.pictures.render_capture CAPTURE [LIGHT ...] [--resolution PX] [--samples N]
     python -m research.benchmarks.pictures.render_capture CAPTURE --contact-sheet
@@ -33,20 +33,22 @@ def main() -> None:
     parser.add_argument("--resolution", type=int, default=640)
     parser.add_argument("--samples", type=int, default=32)
     parser.add_argument("--contact-sheet", action="store_true")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     with extension():
         from bl_ext.user_default.wildcap.wildcap_addon.relight import headless
 
-        if asked.contact_sheet:
-            print(headless.render_contact_sheet(asked.capture, asked.resolution, asked.samples), flush=True)
+        if options.contact_sheet:
+            print(headless.render_contact_sheet(options.capture, options.resolution, options.samples), flush=True)
             return
-        for path in headless.render_relit(asked.capture, asked.lights or headless.ALL, asked.resolution, asked.samples):
+        for path in headless.render_relit(
+            options.capture, options.lights or headless.ALL, options.resolution, options.samples
+        ):
             print(path, flush=True)
 
 
 @contextlib.contextmanager
 def extension() -> Iterator[None]:
-    """The checkout, enabled in this process's Blender as EXTENSION."""
+    """Enable the checkout in this process's Blender as EXTENSION."""
     with tempfile.TemporaryDirectory() as extensions:
         repository = Path(extensions) / "user_default"
         repository.mkdir()

@@ -32,16 +32,16 @@ MAPS, SAMPLES = 1024, 24
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as work:
         pictures = [portrait(seed, Path(work) / str(seed)) for seed in SUBJECTS]
     write_small(
-        asked.out, np.vstack([np.hstack(pictures[row : row + COLUMNS]) for row in range(0, len(pictures), COLUMNS)])
+        options.out, np.vstack([np.hstack(pictures[row : row + COLUMNS]) for row in range(0, len(pictures), COLUMNS)])
     )
 
 
 def portrait(seed: int, work: Path) -> np.ndarray:
-    """A subject in its room, sRGB [SIDE, SIDE, 3]; `work` takes the render."""
+    """Return a subject in its room, sRGB [SIDE, SIDE, 3]; `work` takes the render."""
     shot = scene.Shot(around(-22, 6, 0.52)[None], [0], SAMPLES, SIDE / scene.WIDTH)
     render_frames(work, seed, make_skin(sample_parameters(seed), MAPS), shot, leaves=False)
     picture = images.read_srgb(work / "00000.png")[..., :3]

@@ -70,7 +70,7 @@ def main() -> int:
 
 
 def draw(picture: WindowPicture, folder: Path) -> np.ndarray:
-    """The shots, cut out, reduced and laid side by side, sRGB [H, W, 3]."""
+    """Return the shots, cut out, reduced and laid side by side, sRGB [H, W, 3]."""
     parts = []
     for name, box in zip(picture.shots, picture.boxes * (len(picture.shots) // len(picture.boxes)), strict=True):
         shot = images.read_srgb(folder / f"{name}.png")[..., :3]

@@ -37,7 +37,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 where something differs")
     parser.add_argument("--captures", type=Path, help="solved captures, for teaser.jpg and the gallery's pictures")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     try:
         new = pages()
     except Problem as problem:
@@ -48,12 +48,12 @@ def main() -> int:
         for path, text in new.items()
         if not path.is_file() or path.read_text(encoding="utf-8") != text
     ]
-    for path, text in {} if asked.check else new.items():
+    for path, text in {} if options.check else new.items():
         replace_text(path, text)
-    for command in pictures(asked.captures.resolve()) if asked.captures else ():
+    for command in pictures(options.captures.resolve()) if options.captures else ():
         print(" ".join(command), flush=True)
         subprocess.run([sys.executable, "-m", *command], cwd=ROOT, check=True)
-    wrong = [*(wrong if asked.check else ()), *strangers()]
+    wrong = [*(wrong if options.check else ()), *strangers()]
     print(*wrong, sep="\n", end="\n" * bool(wrong), file=sys.stderr)
     return 1 if wrong else 0
 
@@ -64,7 +64,7 @@ def pages() -> dict[Path, str]:
 
 
 def page(name: str) -> str:
-    """The text of docs/results/NAME.md."""
+    """Return the text of docs/results/NAME.md."""
     module = import_module(f"{__name__}.{name}")
     records = [figures.read_record(record) for record in module.RECORDS]
     sections = module.sections(*(figures.Figures.of(record["figures"]) for record in records))
@@ -74,7 +74,7 @@ def page(name: str) -> str:
 
 
 def strangers() -> list[str]:
-    """What lies in docs/results and is no page of ours."""
+    """Return what lies in docs/results and is no page of ours."""
     there = sorted((ROOT / "docs" / "results").glob("*.md"))
     return [
         f"{path.relative_to(ROOT)} has no research/benchmarks/results/{path.stem}.py that writes it."

@@ -18,7 +18,7 @@ def sections(ablation: Figures) -> Sections:
     lost = [-part[row].to_first for row in ("without texel grid", "without prior") for part in (band, shadow)]
 
     def told(row: str) -> str:
-        """What a row changes in the shadow, in the band and outside."""
+        """Return what a row changes in the shadow, in the band and outside."""
         changes = (f"{part[row].to_first:+.1f}" for part in (shadow, band, outside))
         return ", ".join("0.0" if float(change) == 0 else change for change in changes) + " dB"
 

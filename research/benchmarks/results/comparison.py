@@ -24,7 +24,7 @@ def sections(comparison: Figures) -> Sections:
         return "{:+.2f} ± {:.2f} dB".format(*paired(people)[kind][row]["PSNR, dB"])
 
     def each(kind: str, row: str) -> str:
-        """The same, person by person."""
+        """Return the same, person by person."""
         return by_person(
             {
                 name: subject[kind].wildcap["0"].raw.psnr - subject[kind][row]["0"].raw.psnr

@@ -109,7 +109,7 @@ def sections(delight: Figures, before: Figures, now: Figures) -> Sections:
 
 
 def after_the_solve(before: Figures, now: Figures) -> str:
-    """What the sky is worth to textures and solved albedos, person by person on the captures of both records."""
+    """Return what the sky is worth to textures and solved albedos, person by person on the captures of both records."""
     rows = paired(before, now)
     shared = [name for name in now.captures if name in before.captures]
     gains = [now.captures[name][SOLVED].psnr - before.captures[name][SOLVED].psnr for name in shared]
@@ -149,7 +149,7 @@ def paired(before: Figures, now: Figures) -> Scores:
 
 
 def person_of(capture: str) -> str:
-    """A capture's name without its light."""
+    """Return a capture's name without its light."""
     for light in (*likenesses.LIGHTS, *scan_captures.LIGHTS):
         capture = capture.removesuffix(f"_{light}")
     return capture

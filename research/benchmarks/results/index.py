@@ -75,7 +75,7 @@ def sections(*records: Figures) -> Sections:
 
 
 def list_pages(group: str, names: tuple[str, ...]) -> str:
-    """A group's item: its pages by their titles."""
+    """Return a group's item: its pages by their titles."""
     links = (f"[{import_module(f'{__package__}.{name}').TITLE}]({name}.md)" for name in names)
     return f"- **{group}**: {'; '.join(links)}"
 
@@ -86,7 +86,7 @@ def over_people(summary: Figures, method: str) -> str:
 
 
 def headline(of: Figures) -> str:
-    """The same answers on every set: PSNR in dB."""
+    """Return the same answers on every set: PSNR in dB."""
     summary, sample, scan, costs = of.state.summary, of.demo.rows, of.scan_albedo.rows, of.costs
     relit, people = of.relit.sample, of.relit_people.mean
 
@@ -126,7 +126,7 @@ def headline(of: Figures) -> str:
 
 
 def spread(state: Figures) -> str:
-    """What the solve adds to the delit texture, and how unevenly."""
+    """Return what the solve adds to the delit texture, and how unevenly."""
     solved, captures = state.summary.solved, state.captures
     gains = {
         measure: {
@@ -151,7 +151,7 @@ def spread(state: Figures) -> str:
 
 
 def worse_in_the_picture(gains: dict[str, float]) -> str:
-    """How many captures lose by the solve, and how many of these are the head scan's; gains: dB by capture."""
+    """Return how many captures lose by the solve, and how many of these are the head scan's; gains: dB by capture."""
     worse, scanned = [name for name, gain in gains.items() if gain < 0], [name for name in gains if is_scanned(name)]
     of_scan = (
         f", among them {sum(map(is_scanned, worse))} of the {len(scanned)} of the one real scan, whose own map "
@@ -163,7 +163,7 @@ def worse_in_the_picture(gains: dict[str, float]) -> str:
 
 
 def the_synthetic(people: Iterable[str]) -> str:
-    """How many people are of research/benchmarks/captures/likenesses.py, and how many of
+    """Return how many people are of research/benchmarks/captures/likenesses.py, and how many of
     research/benchmarks/captures/people.py."""
     made = [name for name in people if not is_scanned(name)]
     bald = [name for name in made if is_bald(name)]
@@ -172,7 +172,7 @@ def the_synthetic(people: Iterable[str]) -> str:
 
 
 def gains_by_kind(people: Figures) -> str:
-    """What the solve adds in the picture to the bald, and to all others; '' where there are not some of both."""
+    """Return what the solve adds in the picture to the bald, and to all others; '' where there are not some of both."""
     kinds: dict[bool, list[float]] = {True: [], False: []}
     for name, solved in people.solved.items():
         kinds[is_bald(name)].append(solved["psnr"] - people["delit texture"][name]["psnr"])
@@ -185,22 +185,22 @@ def gains_by_kind(people: Figures) -> str:
 
 
 def is_bald(name: str) -> bool:
-    """Whether a person is of research/benchmarks/captures/people.py."""
+    """Return whether a person is of research/benchmarks/captures/people.py."""
     return any(f"{name}_".startswith(f"{person.name}_") for person in PEOPLE)
 
 
 def is_scanned(name: str) -> bool:
-    """Whether a capture, or a person, is of the head scan (research/benchmarks/captures/scan_captures.py)."""
+    """Return whether a capture, or a person, is of the head scan (research/benchmarks/captures/scan_captures.py)."""
     return name.startswith("scan_")
 
 
 def flat_wins(rows: Figures) -> bool:
-    """Whether one flat colour is as near to a capture's truth in the picture as the solved albedo."""
+    """Return whether one flat colour is as near to a capture's truth in the picture as the solved albedo."""
     return rows["flat colour"].psnr >= rows.solved.psnr
 
 
 def losses(of: Figures) -> str:
-    """What a reader should know before the tables."""
+    """Return what a reader should know before the tables."""
     answers, lamps = of.state.summary, of.photographs.lamps.summary
     against = paired({name: one for name, one in of.comparison.subjects.items() if name != "scan"})["delit"]
     relit, people, tones = of.relit.sample, of.relit_people.mean, of.skin_tone.groups

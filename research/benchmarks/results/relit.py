@@ -73,7 +73,7 @@ def sections(relit: Figures, people: Figures) -> Sections:
 
 
 def by_person(people: Figures) -> str:
-    """What relief and gloss are worth to each: 'dark +1.30'."""
+    """Return what relief and gloss are worth to each: 'dark +1.30'."""
     return ", ".join(
         f"{name.replace('_', ' ')} {rows.solved.psnr - rows.plain.psnr:+.2f}"
         for name, rows in people.items()

@@ -78,7 +78,7 @@ def sections(tone: Figures, real: Figures) -> Sections:
 
 
 def widest_move(real: Figures, way: str) -> float:
-    """The largest difference of L* between the grounds of one person."""
+    """Return the largest difference of L* between the grounds of one person."""
     people = [name for name in real if f"{name}_white" in real]
     grounds = [[real[person + ground][way].lightness for ground in ("", "_white", "_black")] for person in people]
     return max(max(each) - min(each) for each in grounds)
