@@ -43,10 +43,9 @@ class Figures(dict):
 def write_record(path: Path, benchmark: str, command: str, figures: dict, keep: bool = False) -> None:
     """Write a record, with the commit (HEAD's, None outside of git), the day and the machine.
 
-    path: of the JSON file; benchmark: the module's name; command: as the docs have it, folders as CAPITALS; figures:
-    nested; keep: figures of a record that is there stay where they were not measured anew, as of other captures or
-    rows. Raises ValueError for a figure that is no finite number, string, bool or None. Raises Problem: Where `keep`
-    finds another file than a record."""
+    command: as the docs have it, folders as CAPITALS; keep: figures of a record that is there stay where they were
+    not measured anew, as of other captures or rows. Raises ValueError for a figure that is no finite number, string,
+    bool or None. Raises Problem where `keep` finds another file than a record."""
     path, figures = Path(path), plain(figures)
     if keep and path.is_file():
         figures = merged(read_record(path.stem, path.parent)["figures"], figures)

@@ -24,9 +24,7 @@ Sections = list[tuple[str, str]]
 
 
 def write_page(path: Path, title: str, command: str, sections: Sections) -> None:
-    """Write the page of a benchmark that has just run.
-
-    path: of the Markdown file; title: of the page; command: that made the figures; sections: of the page."""
+    """Write the page of a benchmark that has just run."""
     today = datetime.date.today().isoformat()
     made = {"command": command, "commit": commit(), "date": today, "machine": machine_line()}
     replace_text(path, page_text(title, [made], sections))

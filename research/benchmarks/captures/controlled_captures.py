@@ -89,8 +89,7 @@ def by_the_stage(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict
 def use_true_frames(source: Capture, truth: Path, work: Capture, settings: Settings) -> Capture:
     """Has the wild capture's true albedo frames stand for delit ones, up to the texture; made once.
 
-    source: the wild capture; truth: its folder, with albedo/NNNN.png; work: the copy that is made; settings: of all
-    stages but delight. Returns `work`."""
+    Returns `work`."""
     if not work.texture_confidence.is_file():
         begin_at_delight(source, work.root)
         true = from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings)

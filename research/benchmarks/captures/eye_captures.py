@@ -57,8 +57,8 @@ def main() -> None:
 def photograph_person(folder: Path, seed: int, kind: str, facekit: Path | None) -> None:
     """Make one person's capture, if it is not there.
 
-    folder: takes SEED.wildcap, and what was rendered for it; seed: of the person; kind: of the light, a key of
-    people_lights.KINDS; facekit: ICT-FaceKit's folder, of which heads are derived, too; None: other heads."""
+    folder: takes SEED.wildcap, and what was rendered for it; kind: of the light, a key of people_lights.KINDS;
+    facekit: ICT-FaceKit's folder, of which heads are derived, too; None: other heads."""
     capture = Capture(folder / f"{seed}.wildcap")
     if capture.head.is_file():  # written last
         return

@@ -40,10 +40,9 @@ def film_person(
 ) -> Capture:
     """Film a person, if the files are not there, and print the minutes.
 
-    folder: takes NAME, the truth with the video, and NAME.wildcap, the capture; name: of the capture; figure: the
-    person; light: filmed in; description: of the light, for the record; frames: of the video; room: whether one is
-    around the person, by which cameras can be found; without, the capture gets frames, true cameras and a head half a
-    millimetre off."""
+    folder: takes NAME, the truth with the video, and NAME.wildcap, the capture; description: of the light, for the
+    record; room: whether one is around the person, by which cameras can be found; without, the capture gets frames,
+    true cameras and a head half a millimetre off."""
     target, capture = folder / name, Capture(folder / f"{name}.wildcap")
     if (target / "skin_tone.txt").exists():  # written last
         return capture

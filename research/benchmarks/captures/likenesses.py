@@ -90,8 +90,8 @@ def main() -> None:
 def film_likeness(person: Likeness, folder: Path, lights: list[str], facekit: Path | None) -> None:
     """Film a person in each of the lights.
 
-    person: whose own light is among them; folder: as `film_person` has it; lights: "own", and keys of LIGHTS; facekit:
-    ICT-FaceKit's folder, of which heads are derived, too; None: other heads."""
+    person: whose own light is among them; facekit: ICT-FaceKit's folder, of which heads are derived, too; None:
+    other heads."""
     figure = make_figure(person.seed, facekit=facekit)
     if "own" in lights:
         film_person(folder, person.name, figure, KINDS[person.light](person.seed), person.light, OWN_FRAMES, room=True)

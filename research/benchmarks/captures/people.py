@@ -164,8 +164,8 @@ def solve_person(capture: Capture, truth: Path, until: str, quality: str) -> Non
     """Run the chain from delight on, from the scan on where there is no head, as the worker would, as far as it is not
     fresh.
 
-    capture: with frames and cameras; truth: folder with the skin's true tone, which is given; until: the last stage;
-    quality: a preset. Raises SystemExit: With what was wrong, where a stage fails."""
+    truth: folder with the skin's true tone, which is given. Raises SystemExit with what was wrong, where a stage
+    fails."""
     values = {"solve": {"skin_tone": skin_tone(truth)}}
     names, settings = [stage.name for stage in STAGES], from_json(values, preset(quality))
     begin = "delight" if capture.head.is_file() else "scan"

@@ -95,8 +95,7 @@ def make_bars(
     """Return a window's upright and level bars between the head and the light, in a plane across it.
 
     direction: [3], unit, where the light comes from; distance: of the plane from the head, in metres; period: of the
-    upright bars, in metres; level ones have 1.6 of it; width: of a bar, in metres; reach: half a side of the plane, in
-    metres."""
+    upright bars, in metres; level ones have 1.6 of it; reach: half a side of the plane, in metres."""
     side = np.cross(direction, [0, 0, 1.0])
     side /= np.linalg.norm(side)
     up, places = np.cross(side, direction), np.arange(-reach, reach, period)

@@ -124,8 +124,8 @@ def write_views(
 ) -> None:
     """Write frames/ with frames.json, and cameras/: pictures with the known cameras that took them.
 
-    capture: takes them; views: the cameras, which share one lens; pictures: sRGB [H, W, 3], one of each; selected: how
-    many, evenly spread, are selected for the texture; None: all."""
+    views: the cameras, which share one lens; pictures: sRGB [H, W, 3], one of each; selected: how many, evenly
+    spread, are selected for the texture; None: all."""
     capture.claim()
     taken = np.linspace(0, len(views) - 1, selected or len(views)).round().astype(int)
     model = pycolmap.Reconstruction()
@@ -149,8 +149,7 @@ def render_picture(
 ) -> np.ndarray:
     """Return a picture of a head before a dim, uneven background.
 
-    caster: of the head; view: the camera; texture: lit, linear [S, S, 3]; rng: of background and noise; rays: along
-    each side of a pixel. Returns sRGB [H, W, 3]."""
+    texture: lit, linear [S, S, 3]; rays: along each side of a pixel. Returns sRGB [H, W, 3]."""
     face, bary, _ = raster.render_view(caster, view, rays)
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
     at = np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(texture)

@@ -144,10 +144,9 @@ def measure_rows(
 ) -> dict[str, dict]:
     """Score each row's answers to a set of photographs. One that a delighter refuses counts as it is.
 
-    chosen: the photographs; settings: of the delighters; features: whether the feature distance is measured, too; only:
-    what the names of the rows begin with that are asked for; None: all; picture: file that shows six photographs'
-    answers beside each other. Returns Row -> {pictures, refused, figures, groups, seconds_per_picture}, or {not_run:
-    why}."""
+    features: whether the feature distance is measured, too; only: what the names of the rows begin with that are
+    asked for; None: all; picture: file that shows six photographs' answers beside each other. Returns Row ->
+    {pictures, refused, figures, groups, seconds_per_picture}, or {not_run: why}."""
     results, shown = {}, []
     spread = chosen.photographs[:: max(1, len(chosen.photographs) // 6)][:6]
     for row in rows(chosen, settings):

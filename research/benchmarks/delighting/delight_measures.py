@@ -37,8 +37,8 @@ def score_picture(
 ) -> dict[str, float]:
     """Score one delit picture over the facial skin of its truth.
 
-    predicted: sRGB [H, W, 3]; photograph: sRGB [H, W, 3], what it was made from; true: the truth, of that size;
-    features: whether the feature distance is measured, too. Returns FIGURES; nan what cannot be told."""
+    predicted: sRGB [H, W, 3]; photograph: sRGB [H, W, 3], what it was made from; features: whether the feature
+    distance is measured, too. Returns FIGURES; nan what cannot be told."""
     box, mask = face_box(true.face), true.face
     predicted, photograph, albedo, mask = predicted[box], photograph[box], true.albedo[box], mask[box]
     evened = with_gain(predicted, albedo, mask)

@@ -33,8 +33,7 @@ PICTURES = ("srgb", "albedo", "skin", "shadow")
 def make_portraits(work: Path, subjects: int = 6, lights: int = 2, every: int = 1) -> Photographs:
     """Portraits of synthetic subjects of each group of skin tone.
 
-    work: folder that keeps what was made; subjects: of each group; lights: pictures of each subject; every: every n-th
-    picture of a group is taken."""
+    work: folder that keeps what was made; every: every n-th picture of a group is taken."""
     found = []
     for group, seeds in subjects_by_tone(subjects).items():
         taken = [(seed, light) for seed in seeds for light in range(lights)][::every]

@@ -73,9 +73,9 @@ def light_stage(folder: Path, every: int = 1) -> Photographs:
 def select_true_frames(truth: Path, capture: Capture, work: Path, every: int = 1) -> Photographs:
     """Return the frames of a registered capture that have a truth, selected in a copy.
 
-    truth: folder, laid out as research/benchmarks/maps/albedo_score.py says; capture: the registered one, which stays
-    as it is; work: takes copy.wildcap; every: every n-th of these frames is taken; the copy selects all. Raises
-    Problem: Where the capture is not registered or none of its frames has a truth."""
+    truth: folder, laid out as research/benchmarks/maps/albedo_score.py says; capture: the registered one, which
+    stays as it is; every: every n-th of these frames is taken; the copy selects all. Raises Problem where the
+    capture is not registered or none of its frames has a truth."""
     if not capture.head.is_file():
         raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
     copy = begin_at_delight(capture, work / "copy.wildcap")

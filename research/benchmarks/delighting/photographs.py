@@ -135,8 +135,8 @@ def main() -> int:
 def answer_photograph(srgb: np.ndarray, albedo: np.ndarray, lit: np.ndarray, delighter: str) -> dict[str, np.ndarray]:
     """Return all answers to one photograph. A picture that the delighter refuses is taken as it is, as an artist would.
 
-    srgb: [H, W, 3]; albedo: [H, W, 3], linear, the truth; lit: bool [H, W], the pixels of the face that show something;
-    delighter: a key of delight.PHOTOGRAPHERS. Returns Answer -> linear albedo [H, W, 3]."""
+    srgb: [H, W, 3]; albedo: [H, W, 3], linear, the truth; lit: bool [H, W], the pixels of the face that show
+    something. Returns Answer -> linear albedo [H, W, 3]."""
     linear = images.srgb_to_linear(srgb)
     try:
         answer = delight.PHOTOGRAPHERS[delighter](srgb, Settings().delight)[0]

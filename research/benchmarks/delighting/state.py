@@ -221,8 +221,7 @@ def merge_earlier(
     """Return what was measured now, over what a record has of other people; the record is left out, and that is said,
     where other code made it.
 
-    record: its figures; scores: method -> person -> figures; by_capture: capture -> method -> figures; code: what
-    `code_of` says. Returns Scores and figures by capture."""
+    Returns Scores and figures by capture."""
     if record.get("code") != code:
         print("The record's figures were made by other code, and are replaced.", file=sys.stderr)
         return scores, by_capture

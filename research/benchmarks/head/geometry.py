@@ -65,8 +65,7 @@ def subjects(data: Path) -> dict[str, ScannedSubject]:
 def measure_capture(name: str, subject: ScannedSubject, folder: Path, fresh: bool = False) -> dict:
     """Run a capture, compares it with the truth where there is one, and draws it.
 
-    name: of the capture; subject: what is captured; folder: takes NAME.wildcap and pictures/NAME.jpg; fresh: begin anew
-    what is there. Returns The figures; "stopped" tells of the stage that failed, or is None."""
+    Returns the figures; "stopped" tells of the stage that failed, or is None."""
     capture = Capture(folder / f"{name}.wildcap")
     if fresh:
         shutil.rmtree(capture.root, ignore_errors=True)

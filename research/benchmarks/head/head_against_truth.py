@@ -34,9 +34,9 @@ from ...people.sample import RESERVED
 def compare_surface(capture: Capture, truth: Path, mesh: Path | None, surface: str = "head.obj") -> dict:
     """Measure how far a capture's surface lies off the true one, over the face's pixels.
 
-    capture: with cameras; truth: its folder, with cameras and face/; mesh: the true surface; None: the sample's
-    subject; surface: file of the capture, OBJ or PLY. Returns Median, 90th and 95th percentile in mm, as placed by the
-    cameras and after ICP beside it; the cameras' own in mm."""
+    truth: its folder, with cameras and face/; mesh: the true surface; None: the sample's subject; surface: file of
+    the capture, OBJ or PLY. Returns Median, 90th and 95th percentile in mm, as placed by the cameras and after ICP
+    beside it; the cameras' own in mm."""
     pose, shared, theirs = pose_of_truth(capture, truth)
     frames = {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()}
     ours = np.stack([v.centre for v in shared])

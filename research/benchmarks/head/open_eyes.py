@@ -158,9 +158,9 @@ def irises_over_own_skin(views: list[View], fitted: eyeballs.OpenEyes, seed: int
 def compare_eye(eye: Eyeball, opened: np.ndarray, true: lids.OpenHead, side: int, pose: tuple) -> dict:
     """Measure how far a fitted eye is off the true one.
 
-    eye: the fitted eyeball; opened: [N, 3], vertices of the open head, in the eyeball's world; true: the true open
-    head; side: 0 the left eye, 1 the right one; pose: scale, rotation [3, 3] and translation [3] from the truth's world
-    to theirs. Returns A figure of each of COLUMNS; None for the iris' colour and the true openness."""
+    opened: [N, 3], vertices of the open head, in the eyeball's world; side: 0 the left eye, 1 the right one; pose:
+    scale, rotation [3, 3] and translation [3] from the truth's world to theirs. Returns a figure of each of COLUMNS;
+    None for the iris' colour and the true openness."""
     scale, turn, shift = pose
     ball = true.balls[side]
     rims = [

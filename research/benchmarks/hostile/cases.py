@@ -114,9 +114,7 @@ def kinds(names: tuple[str, ...]) -> dict[str, Kind]:
 
 
 def make_case(kind: Kind, place: Path, stock: Stock, rng: random.Random) -> Case:
-    """Make a new case, its capture of hard links: nothing may be written into a file that is there.
-
-    kind: of the case; place: the folder that is made; stock: what is copied and brought; rng: decides the rest."""
+    """Make a new case, its capture of hard links: nothing may be written into a file that is there."""
     shutil.copytree(stock.undisturbed.folder / "end", place, symlinks=True, copy_function=os.link)
     case = Case(place)
     kind.make(case, stock, rng)

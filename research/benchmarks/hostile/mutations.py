@@ -286,8 +286,8 @@ def mutate(path: Path, rng: random.Random) -> tuple[str, str]:
 def make_png(width: int, height: int, rows: bytes, depth: int = 8, colour: int = 2, compressed: bool = False) -> bytes:
     """A PNG's bytes, sound or not.
 
-    width, height: as its header says, whatever `rows` has; rows: each with its filter type before it; depth: bits of a
-    channel; colour: PNG's colour type; 2 is RGB; compressed: whether `rows` already are."""
+    width, height: as its header says, whatever `rows` has; rows: each with its filter type before it; colour: PNG's
+    colour type; 2 is RGB."""
 
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))

@@ -159,7 +159,6 @@ def run_undisturbed(
 ) -> Undisturbed:
     """Run the chain up to a stage, and keeps the place before each and at the end.
 
-    folder: takes before_STAGE and end; until: the last stage; delighter: its setting; tell: hears a line per stage.
     Raises AssertionError where a stage does not end well; and the machine's own errors."""
     names = stages.NAMES[: stages.NAMES.index(until) + 1]
     found = Undisturbed(folder, {**SETTINGS, "delight": {"delighter": delighter}}, names)
@@ -184,8 +183,8 @@ def start_job(
 ) -> Forked:
     """Write a job and starts a worker at it.
 
-    place: whose capture; moment: when the worker is struck; None: never; log_name: ending of the file beside the place
-    that takes its output; limits: `term_s` and `most_bytes` of `fork_worker`; job: as `write_job` has it."""
+    moment: when the worker is struck; None: never; log_name: ending of the file beside the place that takes its
+    output; limits: `term_s` and `most_bytes` of `fork_worker`; job: as `write_job` has it."""
     return fork_worker(
         write_job(capture_at(place), **job), place.with_name(f"{place.name}.{log_name}"), moment, **(limits or {})
     )

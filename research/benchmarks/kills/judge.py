@@ -33,9 +33,9 @@ def judge_kill(
 ) -> list[str]:
     """Find the faults of a place in which something was killed.
 
-    place: judged; known_contents: name in the capture -> hashes of the complete contents that it may have; masks: name
-    -> contents that a mask may have which was being painted; within: folders in which files are new in every run, of
-    which only the user's are judged."""
+    known_contents: name in the capture -> hashes of the complete contents that it may have; masks: name -> contents
+    that a mask may have which was being painted; within: folders in which files are new in every run, of which only
+    the user's are judged."""
     root = capture_at(place).root
     found = find_lost(place, aside=True)
     for name, contents in (masks or {}).items():
@@ -66,8 +66,8 @@ def judge_resume(
     """Find the faults of a place in which the run that goes on has ended: every stage has the undisturbed run's bytes,
     all of the user's is in its place, and nothing else is left.
 
-    place: judged; undisturbed: the run that it is compared with; last: the last stage that was run; masks, within: as
-    `judge_kill` has them; unlike: stages whose bytes differ from run to run."""
+    undisturbed: the run that it is compared with; last: the last stage that was run; unlike: stages whose bytes
+    differ from run to run."""
     capture, expected = capture_at(place), undisturbed.end
     found = judge_kill(place, undisturbed.known, masks, within) + find_lost(place) + _left(place)
     for stage in stages.STAGES[: stages.NAMES.index(last) + 1]:

@@ -78,8 +78,7 @@ class KillTrial:
     def judge_end(self, stage: str, masks: dict | None = None, unlike: tuple = (), unlike_folders: tuple = ()) -> None:
         """Take in the faults at the end of a run that went on.
 
-        stage: the last one that was run; masks, unlike: as `judge.judge_resume` has them; unlike_folders: its `within`.
-        """
+        stage: the last one that was run."""
         self.faults += judge.judge_resume(self.place, self.undisturbed, stage, masks, unlike, unlike_folders)
 
     def judge_kill(self, masks: dict | None = None, within: tuple = ()) -> None:

@@ -156,8 +156,7 @@ def fork_worker(
 ) -> Forked:
     """Fork a worker at a job file.
 
-    job: job.json, in its capture; log: takes its output; moment: when it is struck; None: never; term_s: of its lease,
-    in seconds; most_bytes: of a single file that it writes; None: any."""
+    moment: when it is struck; None: never; most_bytes: of a single file that it writes; None: any."""
 
     def work() -> None:
         main = importlib.import_module("core.worker.__main__")

@@ -160,8 +160,7 @@ def _subjects(arguments: argparse.Namespace, work: Path) -> Iterator[RelitSubjec
 def render_rows(subject: RelitSubject, work: Path, lights: list[str], row_names: list[str]) -> None:
     """Render the pictures that are not newer than what they show.
 
-    subject: with maps of its own and the true ones; work: takes renders/ROW_LIGHT.exr and face.exr; lights: presets,
-    and pictures of surroundings; row_names: of the rows, besides the truth."""
+    subject: with maps of its own and the true ones; row_names: of the rows, besides the truth."""
     capture, truth = subject.capture, subject.maps
     renders, mask = work / "renders", work / "mask.png"
     renders.mkdir(parents=True, exist_ok=True)

@@ -49,8 +49,7 @@ class Worn:
 def make_rows(raw: np.ndarray, delit: np.ndarray, solved: Worn, true: Worn, skin: np.ndarray) -> dict[str, Worn]:
     """Return the table's rows, whose albedos share one mean.
 
-    raw, delit: textures, linear [S, S, 3]; solved, true: maps; skin: [S, S], weight of the texels of that mean. Returns
-    Name -> maps."""
+    raw, delit: textures, linear [S, S, 3]; skin: [S, S], weight of the texels of that mean. Returns Name -> maps."""
     even = np.full_like(solved.specular, (solved.specular * skin).sum() / skin.sum())
     flat = np.broadcast_to(np.float32([0, 0, 1]), solved.normal.shape)
     tone = (true.albedo * skin[..., None]).sum((0, 1)) / skin.sum()

@@ -192,8 +192,7 @@ def _solve_problem(subject: str, shadows: str, solves: list[tuple[str, int]], op
 def solve_row(uv_problem: MaskedUvProblem, row: str, seed: int, steps: int) -> np.ndarray:
     """Solve a problem by one row's method, which is told the true skin tone.
 
-    uv_problem: solved; row: a key of ROWS; seed: of the noise; steps: of every row that does not say otherwise. Returns
-    The albedo, linear [S, S, 3]."""
+    steps: of every row that does not say otherwise. Returns the albedo, linear [S, S, 3]."""
     if row == "the texture itself":
         return uv_problem.texture
     changes, cells, mask, with_prior = ROWS[row]
@@ -212,9 +211,8 @@ def solve_problem(
 ) -> np.ndarray:
     """Solve a problem under a recipe and a requested tone.
 
-    uv_problem: solved; recipe: of the solve; tone: of the skin; seed: of the noise; cells: of V across the face; mask:
-    what becomes of M: "painted", "empty" or "full"; with_prior: False: the texels follow the loss alone. Returns The
-    albedo, linear [S, S, 3]."""
+    mask: what becomes of M: "painted", "empty" or "full"; with_prior: False: the texels follow the loss alone.
+    Returns the albedo, linear [S, S, 3]."""
     size, prior = len(uv_problem.albedo), _prior()
     with tempfile.TemporaryDirectory() as folder:
         capture = Capture(folder)
@@ -243,7 +241,7 @@ def fit_texels(
     ablation).
 
     start: begun from; its state changes, and is returned; recipe: of the lights; its phases last as long as the fit;
-    updates: of Adam; fit: moves the lights after each; smooth: weight of the albedo's L1 variation."""
+    smooth: weight of the albedo's L1 variation."""
     recipe = replace(
         recipe, phases=tuple((which, 0.0, 1.0) for which, _, _ in recipe.phases), refit=0.0, updates=updates
     )

@@ -29,8 +29,8 @@ def measure_regions(
 ) -> dict[str, dict[str, float]]:
     """Compare an albedo with the truth in sRGB, after the gain per channel (linear) that is best for the whole face.
 
-    albedo, truth: linear [S, S, 3]; face: bool [S, S]; regions: name -> bool [S, S]. Returns Region -> figures: PSNR in
-    dB, SSIM, FLIP and the feature distance (where its network is installed)."""
+    albedo, truth: linear [S, S, 3]; face: bool [S, S]; regions: name -> bool [S, S]. Returns Region -> figures: PSNR
+    in dB, SSIM, FLIP and the feature distance (where its network is installed)."""
     gain = (albedo[face] * truth[face]).sum(0) / (albedo[face] ** 2).sum(0)
     ours = images.linear_to_srgb(albedo * gain).astype(np.float32)
     theirs = images.linear_to_srgb(truth).astype(np.float32)

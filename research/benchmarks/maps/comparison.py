@@ -114,9 +114,9 @@ def main() -> None:
 def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[str, dict]:
     """Score all methods on one subject.
 
-    source: a capture with texture and mask; truth: folder of the true albedo, and of the tone that all are given; work:
-    takes each row's maps and scores; what is there is not solved again; size: of the maps, texels along a side. Returns
-    Input -> method -> seed -> figures."""
+    source: a capture with texture and mask; truth: folder of the true albedo, and of the tone that all are given;
+    work: takes each row's maps and scores; what is there is not solved again; size: of the maps, texels along a
+    side. Returns Input -> method -> seed -> figures."""
     torch.set_num_threads(1)
     found: dict[str, dict] = {given: {} for given in INPUTS}
     for given in INPUTS:
@@ -141,9 +141,7 @@ def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[st
 
 
 def find_row_folder(work: Path, input_name: str, method: str, seed: int = 0) -> Path:
-    """Return where a row's diffuse_albedo.exr, shading.exr and score.json lie.
-
-    work: folder of a subject's rows; input_name: one of INPUTS; method: one of METHODS; seed: of the noise."""
+    """Return where a row's diffuse_albedo.exr, shading.exr and score.json lie."""
     return work / f"{input_name}_{method.replace(', ', '_').replace(' ', '_')}_{seed}"
 
 
@@ -152,8 +150,7 @@ def solve_by_method(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Solve a capture by one method.
 
-    capture: with texture and mask; settings: of the solve; method: one of METHODS; seed: of the noise. Returns Diffuse
-    albedo and shading, linear [S, S, 3], and the seconds that it took."""
+    Returns Diffuse albedo and shading, linear [S, S, 3], and the seconds that it took."""
     began = time.monotonic()
     head = read_head(capture)
     evidence = read_evidence(capture, head, settings.solve.size)

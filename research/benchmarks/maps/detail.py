@@ -50,8 +50,8 @@ class FaceRays:
 def cast_face_rays(caster: raster.RayCaster, view: View, true: AlbedoTruth, margin: int = 41) -> FaceRays:
     """Return a view's rays into the head around the face.
 
-    caster: of the head, in the view's world; view: the camera; true: the view's truth, of any size; margin: pixels of
-    the truth around its face."""
+    caster: of the head, in the view's world; true: the view's truth, of any size; margin: pixels of the truth around
+    its face."""
     height, width = true.face.shape
     rows, columns = (np.flatnonzero(true.face.any(axis)) for axis in (1, 0))
     box = tuple(

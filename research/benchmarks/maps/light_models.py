@@ -67,8 +67,7 @@ def light_by_regions(start: Start, recipe: Recipe, count: int, seed: int = 0):
     """Put soft regions with a light each in place of the grid; they begin as clusters of place and lightness on the
     face.
 
-    start: begun from; recipe: of the solve; count: K, of the regions; seed: of the clusters. Returns The start, the
-    recipe, and what moves the lights."""
+    Returns the start, the recipe, and what moves the lights."""
     observations = {
         factor: replace(o, shader=RegionShader(o.shader.normal)) for factor, o in start.observations.items()
     }

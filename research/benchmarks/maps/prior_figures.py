@@ -135,8 +135,8 @@ def card_of(weights: Path) -> dict:
 def draw_from_prior(prior: Prior, coords: torch.Tensor, tone: torch.Tensor, steps: int) -> torch.Tensor:
     """Draw maps from the prior alone.
 
-    prior: loaded; coords: [N, 2, P, P], where the windows lie; tone: [N, 3], linear, of the skins; steps: of the whole
-    noise schedule. Returns [N, 7, P, P] in the network's range."""
+    coords: [N, 2, P, P], where the windows lie; tone: [N, 3], linear, of the skins. Returns [N, 7, P, P] in the
+    network's range."""
     told = make_condition(coords, prior.octaves, prior.mean_face, prior.spread, tone, torch.zeros(len(tone)))
     sigmas = [s for s in karras_sigmas(steps, 0.01, 80.0) if s <= FIRST_SIGMA]
     generator = torch.Generator().manual_seed(0)
@@ -219,8 +219,7 @@ def sample_given_diffuse(
 ) -> torch.Tensor:
     """Return the map that the solver samples under even light where the texture is the true albedo.
 
-    prior: conditioned on the skin's tone; truth: [7, S, S] in the network's range; steps: of the sampling; guidance:
-    "dps" or "proximal". Returns [7, S, S], likewise."""
+    truth: [7, S, S] in the network's range. Returns [7, S, S], likewise."""
     size = truth.shape[-1]
     albedo, everywhere = (truth[:3] + 1) / 2, torch.ones(size, size)
     found = {}

@@ -45,7 +45,7 @@ STEPS, SIZE, LEFT_OUT = 150, 1024, 4
 def measure_rows(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS) -> dict:
     """Score the textures of a capture.
 
-    Raises Problem: Where the capture is not registered or no true frame belongs to it."""
+    Raises Problem where the capture is not registered or no true frame belongs to it."""
     if not capture.head.is_file():
         raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
     head, report, results = read_head(capture), Reporter("texture"), {}

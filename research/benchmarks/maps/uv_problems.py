@@ -92,8 +92,8 @@ class MaskedUvProblem:
 def make_problem(subject: str, shadows: str, size: int, kind: str = "raw") -> MaskedUvProblem:
     """Return a problem; the same arguments give the same one.
 
-    subject: a seed of research/people, "lee_perry_smith", or the path of a skin in our UVs (sRGB); shadows: a key of
-    SHADOWS; size: texels along a side; kind: "raw", or "delit", with little of the light left."""
+    subject: a seed of research/people, "lee_perry_smith", or the path of a skin in our UVs (sRGB); kind: "raw", or
+    "delit", with little of the light left."""
     albedo = albedo_of(subject, size)
     seeds = tuple(hashlib.blake2b(f"{Path(subject).stem} {shadows}".encode(), digest_size=8).digest())
     shading, kept, shadow = _chosen_light(shadows, seeds, size)

@@ -59,8 +59,8 @@ def score_edges(
     """Measure what an answer leaves along the edges of a shadow.
 
     log, log_true: [H, W], natural logarithms of linear green of answer and truth; shadow: bool [H, W], the true one;
-    mask: bool [H, W], pixels that count; height: the face's, in pixels; lit: bool [H, W], where along the edge the
-    light really steps (a terminator fades, and is no edge for a narrow window); None: everywhere."""
+    mask: bool [H, W], pixels that count; lit: bool [H, W], where along the edge the light really steps (a terminator
+    fades, and is no edge for a narrow window); None: everywhere."""
     if not (shadow & mask).any() or not (~shadow & mask).any():
         return EdgeScores(None, None, None, None, None)
     distance, residual = signed_distance(shadow), np.where(mask, log - log_true, 0).astype(np.float32)

@@ -21,10 +21,8 @@ def slope(
     """Return how far the change between two answers follows the change between their causes: least squares over the
     pixels `mask` bool [H, W], all channels.
 
-    answers: two albedos; causes: the two true albedos, or the two pictures; linear [H, W, 3]. Changes are of
-    logarithms, each channel about its mean, for a gain is not judged. None where the causes hardly differ (by less than
-    1 % in deviation).
-    """
+    causes: the two true albedos, or the two pictures; linear [H, W, 3]. Changes are of logarithms, each channel
+    about its mean, for a gain is not judged. None where the causes hardly differ (by less than 1 % in deviation)."""
     moved, cause = (_change(pair, mask) for pair in (answers, causes))
     return float((moved * cause).sum() / (cause * cause).sum()) if cause.std() > 0.01 else None
 

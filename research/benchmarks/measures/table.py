@@ -79,8 +79,7 @@ def format_table(
     """Return a line per method: mean +- spread over people; with `against`, a second table of the paired differences +-
     their standard errors. A column that nobody has is left out.
 
-    summary: of `summarise`; columns: measure -> its column; title: heading of the methods; against: the method that
-    `summary` has differences from. Returns Markdown."""
+    against: the method that `summary` has differences from. Returns Markdown."""
     shown = {name: column for name, column in columns.items() if any(name in row for row in summary.values())}
     tables = [
         markdown(

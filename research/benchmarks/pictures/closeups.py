@@ -52,8 +52,8 @@ Shots = Callable[[str], dict[str, CloseUp]]
 def run_closeups(module: str, description: str, shots: Shots, resolution: int, samples: int) -> None:
     """The command that a module of close-ups is: a row of pictures for each person.
 
-    module: its name in benchmarks; description: its docstring; shots: name of a person -> name of a picture -> what it
-    shows; resolution: pixels of a side, where the command does not say; samples: of Cycles, likewise."""
+    shots: name of a person -> name of a picture -> what it shows; resolution: pixels of a side, where the command
+    does not say."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="keeps captures and renders; finished renders are taken as they are")
     parser.add_argument("out", type=Path)
@@ -121,8 +121,7 @@ def prepare(folder: Path, name: str, seed: int) -> Path:
 def render_closeups(root: Path, shots: dict[str, CloseUp], resolution: int, samples: int) -> None:
     """Render those close-ups of a capture that are not there yet.
 
-    root: the capture's folder, which takes renders/NAME.png; shots: name -> what it shows; resolution: pixels of a
-    side; samples: of Cycles."""
+    root: the capture's folder, which takes renders/NAME.png."""
     left = {name: shot for name, shot in shots.items() if not (root / "renders" / f"{name}.png").is_file()}
     if not left:
         return
@@ -151,8 +150,7 @@ def render_closeups(root: Path, shots: dict[str, CloseUp], resolution: int, samp
 def shoot_closeup(obj, shot: CloseUp, resolution: int, samples: int, path: Path) -> None:
     """Render one close-up.
 
-    obj: the head, with the hair, eyes and mouth that the picture shows; shot: what it shows; resolution: pixels of a
-    side; samples: of Cycles; EEVEE takes EEVEE_SAMPLES; path: of the PNG."""
+    obj: the head, with the hair, eyes and mouth that the picture shows."""
     import bpy
     from bl_ext.user_default.wildcap.wildcap_addon.relight import picture
 
