@@ -18,7 +18,7 @@ from research.benchmarks.captures import people, people_lights
 from research.benchmarks.delighting.delight_measures import TONES, tone_group  # noqa: E402
 from research.benchmarks.light import relit  # noqa: E402
 from research.benchmarks.light.relit_maps import Worn, make_rows, read_worn, worn_by, write_row  # noqa: E402
-from research.benchmarks.pictures import gallery
+from research.benchmarks.pictures import gallery, sheet
 from research.people import pigment  # noqa: E402
 from research.people.identities import reserved_seeds  # noqa: E402
 from research.people.parameters import sample_parameters  # noqa: E402
@@ -224,6 +224,6 @@ def test_a_gallery_row_is_two_lines_and_small_enough(tmp_path):
     row = gallery.sheet([noise] * 14)
     assert row.shape == (2 * gallery.TILE, 7 * gallery.TILE, 3)
     np.testing.assert_array_equal(row[gallery.TILE :, -gallery.TILE :], noise)
-    gallery.write_small(tmp_path / "plain.jpg", gallery.sheet([np.full((8, 8, 3), 0.5, np.float32)] * 13))
-    assert (tmp_path / "plain.jpg").stat().st_size < gallery.MOST_BYTES
+    sheet.write_small(tmp_path / "plain.jpg", gallery.sheet([np.full((8, 8, 3), 0.5, np.float32)] * 13))
+    assert (tmp_path / "plain.jpg").stat().st_size < sheet.MOST_BYTES
     assert not gallery.sheet([noise] * 13)[gallery.TILE :, -gallery.TILE :].any()  # what is missing is black

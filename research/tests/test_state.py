@@ -262,7 +262,7 @@ def test_a_capture_that_cannot_be_solved_is_named_and_the_others_go_on(tmp_path,
         raise SystemExit("There is no head.")
 
     monkeypatch.setattr(state.people, "solve_person", fail)
-    state.run_chain(Capture(tmp_path / "anna.wildcap"), tmp_path / "anna", "draft")
+    state.run_chain(Capture(tmp_path / "anna.wildcap"), tmp_path / "anna")
     assert capsys.readouterr().err == "anna: There is no head.\n"
 
 

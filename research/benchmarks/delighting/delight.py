@@ -43,7 +43,7 @@ from core.stages import delight
 
 from .. import figures
 from ..measures.pictures import with_gain
-from ..pictures.gallery import write_small
+from ..pictures.sheet import write_small
 from .delight_measures import flat_tone, mean_of, score_picture, sheet, shortfalls, square, table, tone_group
 from .delight_portraits import make_portraits
 from .delight_sets import Photograph, Photographs, light_stage, registered, select_true_frames

@@ -64,7 +64,7 @@ def run_closeups(module: str, description: str, shots: Shots, resolution: int, s
     from core.imaging import images
 
     from ..captures.people import PEOPLE
-    from .gallery import write_small
+    from .sheet import write_small
 
     captures = [
         prepare(options.folder, person.name, person.seed)
@@ -74,9 +74,15 @@ def run_closeups(module: str, description: str, shots: Shots, resolution: int, s
     rows = []
     # each in a process of its own: what EEVEE has compiled for one head, it does not give back
     for capture in captures:
-        words = [str(capture), str(options.resolution), str(options.samples)]
+        words = [f"{__package__}.{module}", str(capture), str(options.resolution), str(options.samples)]
         subprocess.run(
-            [sys.executable, "-m", "research.benchmarks.pictures.closeups", f"research.benchmarks.{module}", *words],
+            [
+                sys.executable,
+                "-m",
+                "research.benchmarks.pictures.closeups",
+                f"research.benchmarks.pictures.{module}",
+                *words,
+            ],
             cwd=ROOT,
             check=True,
         )

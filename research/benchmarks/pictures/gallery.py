@@ -28,13 +28,13 @@ from core.geometry import meshes, raster
 from core.geometry.views import View, read_views
 from core.imaging import images
 
+from .sheet import in_rows, write_small
+
 ROOT = Path(__file__).resolve().parents[3]
 LIGHTS = ("three_point", "window", "sun", "city.exr")
 TILE, RESOLUTION, SAMPLES = 224, 320, 24  # pixels, pixels, rays per pixel
 # MediaPipe's landmark beside the nose, on the person's right; side of the close-up as a share of the map
 CHEEK, CLOSE_UP = 203, 0.11
-MOST_BYTES = 180_000
-QUALITIES = (90, 86, 82, 78, 74, 70, 64)  # of the JPEG, the first that is small enough
 
 
 def main() -> None:
@@ -136,17 +136,7 @@ def landmark_uv(index: int) -> np.ndarray:
 def sheet(pictures: list[np.ndarray]) -> np.ndarray:
     """Square pictures in two lines, each TILE wide."""
     tiles = [np.clip(images.resize(np.asarray(picture, np.float32), TILE, TILE), 0, 1) for picture in pictures]
-    half = (len(tiles) + 1) // 2
-    tiles += [np.zeros_like(tiles[0])] * (2 * half - len(tiles))
-    return np.vstack([np.hstack(tiles[:half]), np.hstack(tiles[half:])])
-
-
-def write_small(path: Path, srgb: np.ndarray) -> None:
-    """A JPEG of the best of QUALITIES that takes no more than MOST_BYTES."""
-    for quality in QUALITIES:
-        images.write_srgb(path, srgb, quality=quality)
-        if path.stat().st_size <= MOST_BYTES:
-            return
+    return in_rows(tiles, (len(tiles) + 1) // 2)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from core.geometry import meshes, raster
 from core.geometry.views import View, read_views
 from core.imaging import images
 
-from .gallery import write_small
+from .sheet import write_small
 
 HEIGHT = 480
 

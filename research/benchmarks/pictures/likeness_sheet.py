@@ -15,6 +15,7 @@ from core.imaging import images
 from ...people import scene
 from ...people.lifelike import filmed
 from ...people.lifelike.figure import Figure, make_figure
+from .sheet import square
 
 SIDE, SAMPLES, SCALE = 290, 12, 0.5
 SUN = np.array([0.55, -0.70, 0.46])
@@ -46,12 +47,5 @@ def _shots(figure: Figure, work: Path) -> list[np.ndarray]:
         folder = work / str(k)
         camera = scene.looking(at[None], np.array([target]), np.zeros(1))
         filmed.render(folder, figure, light, scene.Shot(camera, [0], SAMPLES, SCALE, room=False, focal=focal), bare)
-        shots.append(_square(images.linear_to_srgb(np.clip(images.read_linear(folder / "00000.exr"), 0, 1))))
+        shots.append(square(images.linear_to_srgb(np.clip(images.read_linear(folder / "00000.exr"), 0, 1)), SIDE))
     return shots
-
-
-def _square(picture: np.ndarray) -> np.ndarray:
-    """Return the middle of a picture [H, W, 3] as one of SIDE x SIDE."""
-    side = min(picture.shape[:2])
-    top, left = (picture.shape[0] - side) // 2, (picture.shape[1] - side) // 2
-    return images.resize(picture[top : top + side, left : left + side, :3], SIDE, SIDE)

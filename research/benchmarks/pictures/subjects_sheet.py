@@ -20,7 +20,7 @@ from ...people import scene
 from ...people.parameters import sample_parameters
 from ...people.sample import render_frames
 from ...people.skin import make_skin
-from .gallery import write_small
+from .sheet import in_rows, write_small
 from .video_examples import around
 
 SUBJECTS = tuple(range(900001, 900009))
@@ -35,9 +35,7 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as work:
         pictures = [portrait(seed, Path(work) / str(seed)) for seed in SUBJECTS]
-    write_small(
-        options.out, np.vstack([np.hstack(pictures[row : row + COLUMNS]) for row in range(0, len(pictures), COLUMNS)])
-    )
+    write_small(options.out, in_rows(pictures, COLUMNS))
 
 
 def portrait(seed: int, work: Path) -> np.ndarray:

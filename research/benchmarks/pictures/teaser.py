@@ -17,6 +17,8 @@ from core.capture.capture import Capture
 from core.geometry.views import read_views
 from core.imaging import images
 
+from .sheet import in_rows, square
+
 SIDE = 480
 LIGHTS = "sun", "three_point", "window"
 
@@ -32,25 +34,17 @@ def main() -> None:
     mask = images.read_mask(capture.shadow_mask if capture.shadow_mask.exists() else capture.shadow_mask_auto)
     mask = images.resize(mask, texture.shape[1], texture.shape[0])[..., None]
     albedo = capture.maps_4k if capture.maps_4k.is_dir() else capture.maps
-    above = [
+    filmed = [
         images.read_srgb(views[len(views) // 2].path),
         texture * (1 - 0.6 * mask) + mask * np.float32([0.6, 0, 0]),
         images.read_srgb(albedo / "diffuse_albedo.png"),
     ]
-    below = [images.read_srgb(capture.renders / f"{light}.png") for light in LIGHTS]
+    relit = [images.read_srgb(capture.renders / f"{light}.png") for light in LIGHTS]
     images.write_srgb(
         arguments.target,
-        np.vstack([np.hstack([_square(picture) for picture in row]) for row in (above, below)]),
+        in_rows([square(picture, SIDE, above=3) for picture in (*filmed, *relit)], len(LIGHTS)),
         quality=88,
     )
-
-
-def _square(picture: np.ndarray) -> np.ndarray:
-    """Cropped to its middle square and resampled to SIDE."""
-    height, width = picture.shape[:2]
-    side = min(height, width)
-    top, left = (height - side) // 3, (width - side) // 2
-    return images.resize(picture[top : top + side, left : left + side], SIDE, SIDE)
 
 
 if __name__ == "__main__":
