@@ -246,7 +246,8 @@ def _settings(case: Case, stock: Stock, rng: random.Random) -> None:
         )
         case.command = ["run", "-", root, "--until", "frames", f"--set={name}={value[:500]}"]
         case.said = f"--set {name}={value[:60]!r}"
-        case.named = (name or "''", "--set", name.rpartition(".")[2] or "--set")
+        setting = name.rpartition(".")[2] or "--set"
+        case.named = (name or "''", "--set", setting, setting.replace("_", " "))
 
 
 def _cameras(case: Case, stock: Stock, rng: random.Random) -> None:
