@@ -14,10 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .mixture import LUMINANCE_SIGMA_LOG, OUTLIER_SHARE, expect, log_likelihood
 from .skylight import fibonacci_sphere
 from .spherical_harmonics import UNIFORM
 
+LUMINANCE_SIGMA_LOG = 0.2  # spread of skin about its tone, in natural log units: common to the three channels ...
+CHROMA_SIGMA_LOG = 0.08  # ... and of the differences between channels
+OUTLIER_SHARE = 0.05  # of points in neither state (hair, highlights, misregistration)
+OUTLIER_RANGE_LOG = 3.0  # log units over which an outlier may lie, per channel
 SKY_MEAN = np.array([0, 0, 0.41, 0, 0, 0, -0.11, 0, 0])
 SKY_DEVIATION = np.array([0, 0.44, 0.29, 0.44, 0.40, 0.30, 0.40, 0.30, 0.40])
 """Environments without their sun or lamp: coefficients as shares of the first, mean and deviation of 35 panoramas
@@ -121,6 +124,31 @@ def fit_light(
     best = _expectation_maximisation(skin, cosine, visible, best, iterations=30)
     floor = AMBIENT_FLOOR_SHARE * np.median(transfer @ best.environment, 0)
     return Light(best.environment, best_direction, best.sun, floor), best.lit, best.inlier
+
+
+def log_likelihood(
+    residual: np.ndarray, luminance_sigma: float = LUMINANCE_SIGMA_LOG, chroma_sigma: float = CHROMA_SIGMA_LOG
+) -> np.ndarray:
+    """Return the log density [...] of deviations [..., 3] (natural log units) from the expected colour of skin."""
+    red, green, blue = (residual[..., k] for k in range(3))  # several times faster than a mean over an axis of three
+    common = (red + green + blue) / 3
+    chroma = (red - common) ** 2 + (green - common) ** 2 + (blue - common) ** 2
+    return -0.5 * (3 * common**2 / luminance_sigma**2 + chroma / chroma_sigma**2) - np.log(
+        luminance_sigma * chroma_sigma**2 * (2 * np.pi) ** 1.5
+    )
+
+
+def expect(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what the log densities [N] of two states, times their priors, say of each point.
+
+    The share [N] of the first state among the two, the probability [N] of no outlier, and the log evidence [N].
+    """
+    outlier = np.log(OUTLIER_SHARE) - 3 * np.log(OUTLIER_RANGE_LOG)
+    terms = np.stack([first, second, np.full(len(first), outlier)])  # [3, N]
+    peak = terms.max(0)
+    shares = np.exp(terms - peak)
+    total = shares.sum(0)
+    return shares[0] / np.maximum(shares[0] + shares[1], 1e-30), 1 - shares[2] / total, peak + np.log(total)
 
 
 def _around(direction: np.ndarray, spread: float) -> np.ndarray:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ...light.mixture import log_likelihood
+from ...light.sunlight import log_likelihood
 
 ALBEDO_SHARE = 0.03  # scale over which skin's albedo is taken for even, as a share of the frame's longer side
 COHERENCE_LOG_ODDS = 3.0  # weight of the neighbourhood's opinion, in log odds

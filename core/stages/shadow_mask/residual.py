@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...light.mixture import OUTLIER_SHARE, expect, log_likelihood
 from ...light.spherical_harmonics import sh_polynomials
+from ...light.sunlight import OUTLIER_SHARE, expect, log_likelihood
 
 LUMINANCE_SIGMA_LOG = 0.15  # spread of lit skin about its smooth expectation, natural log units ...
 CHROMA_SIGMA_LOG = 0.06  # ... and of the differences between channels

@@ -14,8 +14,7 @@ import numpy as np
 from ...capture.messages import Reporter
 from ...face.head import Unfolded
 from ...geometry.raster import interpolate
-from ...light.mixture import log_likelihood
-from ...light.sunlight import fit_light
+from ...light.sunlight import fit_light, log_likelihood
 from .tidy import cohere
 
 FIT_TEXELS = 1200  # of skin that the light is fitted to
