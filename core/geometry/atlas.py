@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""UVs for a mesh that has none worth using, by xatlas (MIT), and what is wrong with those it has.
+"""New UVs for a mesh by xatlas (MIT), and the faults of a mesh's own UVs.
 
 A UV tile is the unit square at whole (u, v); tile (0, 0) is UDIM 1001, (1, 0) is 1002, (0, 1) is 1011.
 """
@@ -15,24 +15,22 @@ from . import raster
 from .meshes import Mesh
 
 CHECK_SIDE_TEXELS = 512
-"""Of the map on which overlaps and packing are counted: shares of a quarter of a million texels."""
+"""Side of the map in which overlaps and packing are counted."""
 FILLED_SHARE = 0.6
-"""Share of the square that charts of a face with their margins are taken to fill: decides the scale at which they are
-packed."""
+"""Share of the square that a face's charts are expected to fill; decides the scale at which they are packed."""
 MOST_OVERLAP_SHARE = 0.01
-"""Share of the covered texels that may lie under two triangles: charts touch, and fans of tiny triangles fold."""
+"""Tolerated share of texels under two triangles: charts touch, and fans of tiny triangles fold."""
 
 
 def unwrap(mesh: Mesh, size: int, gap_px: int = 2) -> Mesh:
-    """The same vertices and triangles with new UVs in one square, charts about 2 `gap_px` texels apart in a map of that
-    size.
+    """Return the mesh with new UVs in one square, charts about 2 `gap_px` texels apart in a map of `size`.
 
-    The same mesh gives the same UVs. Triangles without area end up in a corner.
+    Deterministic. Triangles without area end up in a corner.
     """
     import xatlas  # here, because only jobs that unwrap need it
 
     atlas, charts, packing = xatlas.Atlas(), xatlas.ChartOptions(), xatlas.PackOptions()
-    # it turns a chart by swapping u and v, which makes a mirror image of it
+    # xatlas rotates a chart by swapping u and v, which mirrors it
     charts.fix_winding, packing.rotate_charts = True, False
     packing.padding, packing.bilinear = gap_px, True
     # a fixed resolution would leave room for a third of the texels
@@ -43,7 +41,7 @@ def unwrap(mesh: Mesh, size: int, gap_px: int = 2) -> Mesh:
     )
     atlas.generate(charts, packing)
     _, faces, uvs = atlas[0]
-    side = max(atlas.width, atlas.height)  # the packed area is no square, texels are
+    side = max(atlas.width, atlas.height)  # the packed area is not square, texels are
     mapped = replace(
         mesh,
         uvs=np.asarray(uvs, np.float64) * [atlas.width / side, atlas.height / side],
@@ -54,13 +52,12 @@ def unwrap(mesh: Mesh, size: int, gap_px: int = 2) -> Mesh:
 
 
 def tiles(mesh: Mesh) -> np.ndarray:
-    """The tile each triangle lies in, whole numbers [F, 2]: that of its middle, for a chart may end on its tile's
-    edge."""
+    """Return the tile of each triangle, int [F, 2]: that of its centroid, as a chart may end on a tile's edge."""
     return np.floor(mesh.uvs[mesh.face_uvs].mean(1)).astype(np.int64)
 
 
 def udim(tile) -> int:
-    """The UDIM number of a tile (u, v). Those left of or below the first have none (ValueError)."""
+    """Return the UDIM number of a tile (u, v). Raises ValueError for tiles left of, below or beyond the ten columns."""
     u, v = (int(x) for x in tile)
     if not (0 <= u < 10 and v >= 0):
         raise ValueError(f"tile {u}, {v} has no UDIM number")
@@ -68,50 +65,51 @@ def udim(tile) -> int:
 
 
 def in_tile(mesh: Mesh, tile, chosen: np.ndarray) -> Mesh:
-    """The triangles of bool [F] with their UVs moved from `tile` to the unit square."""
+    """Return the triangles `chosen` bool [F] with their UVs moved from `tile` to the unit square."""
     return replace(mesh, faces=mesh.faces[chosen], uvs=mesh.uvs - np.asarray(tile), face_uvs=mesh.face_uvs[chosen])
 
 
 def faults(mesh: Mesh) -> list[str]:
-    """What keeps a map from being painted in a mesh's UVs, one sentence each; [] when nothing does."""
+    """Return what prevents painting a map in a mesh's UVs, one sentence each."""
     if mesh.uvs is None:
         return ["It has no UVs, or some of its polygons have none."]
-    of = tiles(mesh)
+    tile = tiles(mesh)
     defects = []
-    if of.min() < 0 or of[:, 0].max() > 9:
-        defects.append("Some UVs lie left of, below or more than ten tiles right of the first tile.")
+    if tile.min() < 0 or tile[:, 0].max() > 9:
+        defects.append("Some UVs lie left of the first tile, below it or more than ten tiles to its right.")
     collapsed = (np.abs(_double_areas(mesh.uvs[mesh.face_uvs])) < 1e-12).mean()
     if collapsed > 0.05:
-        defects.append(f"{100 * collapsed:.0f} percent of its triangles have no area in the UVs.")
+        defects.append(f"{100 * collapsed:.0f} percent of the triangles have no area in the UVs.")
     overlap = overlap_share(mesh)
     if overlap > MOST_OVERLAP_SHARE:
-        defects.append(f"{100 * overlap:.0f} percent of its UVs overlap.")
+        defects.append(f"{100 * overlap:.0f} percent of the UVs overlap.")
     return defects
 
 
-def overlap_share(mesh: Mesh, size: int = CHECK_SIDE_TEXELS) -> float:
-    """Share of the covered texels that lie in two triangles or more."""
-    of = tiles(mesh)
+def overlap_share(mesh: Mesh) -> float:
+    """Return the share of covered texels that lie in more than one triangle."""
+    tile_of = tiles(mesh)
     covered = doubled = 0
-    for tile in np.unique(of, axis=0):
-        patch = in_tile(mesh, tile, (of == tile).all(1))
-        first, _ = raster.rasterize_uv(patch, size)
-        last, _ = raster.rasterize_uv(replace(patch, faces=patch.faces[::-1], face_uvs=patch.face_uvs[::-1]), size)
+    for tile in np.unique(tile_of, axis=0):
+        patch = in_tile(mesh, tile, (tile_of == tile).all(1))
+        backwards = replace(patch, faces=patch.faces[::-1], face_uvs=patch.face_uvs[::-1])
+        first, last = (raster.rasterize_uv(each, CHECK_SIDE_TEXELS)[0] for each in (patch, backwards))
         last = np.where(last >= 0, len(patch.faces) - 1 - last, -1)
         covered += (first >= 0).sum()
         doubled += (first != last).sum()
     return float(doubled / max(covered, 1))
 
 
-def packing(mesh: Mesh, size: int = CHECK_SIDE_TEXELS) -> float:
-    """Share of the first tile that its charts cover."""
-    return float((raster.rasterize_uv(mesh, size)[0] >= 0).mean())
+def packing(mesh: Mesh) -> float:
+    """Return the share of the first tile that charts cover."""
+    return float((raster.rasterize_uv(mesh, CHECK_SIDE_TEXELS)[0] >= 0).mean())
 
 
 def stretch(mesh: Mesh) -> np.ndarray:
-    """Per triangle the larger of its stretches [F]: 1 for one that keeps its shape and the mean scale of the map, 2 for
-    one drawn out to twice in some direction or shrunk to half in one (the singular values of Sander et al. 2001, over
-    the mean scale)."""
+    """Return the larger stretch of each triangle [F], relative to the map's mean scale.
+
+    1 keeps its shape and scale, 2 is doubled or halved in some direction (singular values of Sander et al. 2001).
+    """
     corners, uvs = mesh.vertices[mesh.faces], mesh.uvs[mesh.face_uvs]
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     length = np.maximum(np.linalg.norm(e1, axis=1), 1e-12)
@@ -126,7 +124,7 @@ def stretch(mesh: Mesh) -> np.ndarray:
 
 
 def _areas(mesh: Mesh) -> np.ndarray:
-    """Areas [F] of the triangles in the units of the mesh."""
+    """Areas [F] of the triangles."""
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
 

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Maps of one surface baked into the UVs of another that lies on it.
+"""Bake maps of one surface into the UVs of another that lies on it.
 
-For every texel of the target its partner on the source gives the place to read. Work goes by strips of rows and one map
-after the other, so that memory is a few maps of the target's size, whatever the meshes are.
+Each texel of the target reads at its partner on the source. Maps are processed in strips of rows, one after the other,
+so that memory stays at a few maps of the target's size.
 """
 
 from __future__ import annotations
@@ -19,18 +19,17 @@ from . import atlas, raster, surfaces
 from .meshes import Mesh, vertex_normals
 
 STRIP_ROWS = 128
-"""Rows of a map that are worked out at once: what they need beside the map stays small, and a cancel is heard."""
+"""Rows processed at once: limits memory and the time until a cancel."""
 BLEED_PX = 16
-"""Bleed at a map of 4096; smaller maps have less in proportion, but no less than two."""
+"""Margin in a map of 4096; proportionally less in smaller ones, but at least two."""
 
 
 @dataclass(frozen=True)
 class TexelPartners:
-    """For each texel [S, S] of a tile where its partner lies in the source's maps.
+    """Partners of the texels [S, S] of a tile in the source's maps.
 
-    uv float32 [S, S, 2] (nan: no partner), turn float32 [S, S]: the angle in radians that takes directions of the
-    source's tangent plane to the target's, mirrored bool [S, S]: whether one of the two is a mirror image, covered bool
-    [S, S]: texels inside a triangle.
+    uv float32 [S, S, 2] (nan: no partner); turn float32 [S, S]: angle in radians from the source's tangent directions
+    to the target's; mirrored bool [S, S]: one of the two is a mirror image; covered bool [S, S]: inside a triangle.
     """
 
     uv: np.ndarray
@@ -44,7 +43,7 @@ class TexelPartners:
 
 
 class Source:
-    """The surface whose maps are read, ready to be searched."""
+    """A surface whose maps are read, indexed for search."""
 
     def __init__(self, mesh: Mesh):
         self.mesh = surfaces.welded(mesh)[0]
@@ -61,17 +60,9 @@ def places(
     tick: Callable[[float], None],
     painted: np.ndarray | None = None,
 ) -> TexelPartners:
-    """Partners of the texels of a tile of the target's UVs.
+    """Find the partners of the texels of a tile (u, v) of the target's UVs, at most `farthest` metres away.
 
-    Parameters
-    ----------
-    target : the mesh whose map it is
-    tile : (u, v)
-    source : the mesh on which partners lie
-    size : of the map, in texels along a side
-    farthest : metres
-    tick : is called with the share done, per strip
-    painted : bool [F], the triangles that count; all by default
+    `tick` is called with the share done, per strip; `painted` bool [F]: the triangles that count (default: all).
     """
     whole = surfaces.welded(target)[0]
     where = (atlas.tiles(whole) == np.asarray(tile)).all(1) & (True if painted is None else painted)
@@ -95,12 +86,13 @@ def places(
         face, bary = np.flatnonzero(crossing)[face[inside]], bary[inside].astype(np.float64)
         points = raster.interpolate(patch.vertices, patch.faces, face, bary)
         t, b, n = surfaces.frames(normals, patch.faces, tangent, hand, face, bary)
-        there, at = source.surface.find_partners(points, n, farthest)
-        matched = there >= 0
-        read = (source.mesh.uvs[source.mesh.face_uvs[there[matched]]] * at[matched, :, None]).sum(1)
-        angle = _turn(source, there[matched], at[matched], t[matched], b[matched], n[matched])
-        mirror = source.hand[there[matched]] != hand[face[matched]]
-        for array, samples in ((uv, read), (turn, angle), (mirrored, mirror)):
+        partner, partner_bary = source.surface.find_partners(points, n, farthest)
+        matched = partner >= 0
+        partner, partner_bary = partner[matched], partner_bary[matched]
+        source_uv = (source.mesh.uvs[source.mesh.face_uvs[partner]] * partner_bary[:, :, None]).sum(1)
+        angle = _turn(source, partner, partner_bary, t[matched], b[matched], n[matched])
+        mirror = source.hand[partner] != hand[face[matched]]
+        for array, samples in ((uv, source_uv), (turn, angle), (mirrored, mirror)):
             view = array[row:end]
             flat = view[inside]
             flat[matched] = samples
@@ -109,7 +101,7 @@ def places(
 
 
 def bake(image: np.ndarray, at: TexelPartners) -> np.ndarray:
-    """A source map [H, W(, C)] read at the places, bicubic, [S, S(, C)] float32; the gaps filled and bled."""
+    """Read a source map [H, W(, C)] at the partners, bicubic: [S, S(, C)] float32, gaps filled and bled."""
     image = _matched(np.asarray(image, np.float32), at)
     height, width = image.shape[:2]
     out = np.empty((*at.covered.shape, *image.shape[2:]), np.float32)
@@ -125,11 +117,9 @@ def bake(image: np.ndarray, at: TexelPartners) -> np.ndarray:
 
 
 def bake_normals(packed: np.ndarray, at: TexelPartners) -> np.ndarray:
-    """A tangent space normal map [H, W, 3] packed into [0, 1], OpenGL Y+, turned from the source's tangent frames into
-    the target's.
+    """Bake a tangent space normal map [H, W, 3] in [0, 1] (OpenGL, Y up), rotated into the target's tangent frames.
 
-    What it tells is how the skin leaves its own smooth surface; that is kept, for the target brings a smooth surface of
-    its own.
+    The deviation from the source's smooth surface is kept; the target brings a smooth surface of its own.
     """
     out = bake(packed, at)
     for row in range(0, len(out), STRIP_ROWS):
@@ -145,8 +135,7 @@ def bake_normals(packed: np.ndarray, at: TexelPartners) -> np.ndarray:
 
 
 def bled(image: np.ndarray, at: TexelPartners) -> np.ndarray:
-    """The map with a margin around what is known that repeats its nearest texel, and a smooth continuation of it
-    beyond, over the rest of the tile."""
+    """Fill a map: nearest texels in a margin around the known ones, a smooth continuation beyond."""
     known = at.known
     if known.all() or not known.any():
         return image
@@ -164,8 +153,7 @@ def bled(image: np.ndarray, at: TexelPartners) -> np.ndarray:
 
 
 def _continued(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Values times weights [h, w, C] and weights [h, w] in [0, 1] -> values everywhere, from ever coarser means where
-    the weight is low (pull-push, Gortler et al. 1996)."""
+    """Fill values times weights [h, w, C] with weights [h, w] in [0, 1] by pull-push (Gortler et al. 1996)."""
     if min(weight.shape) <= 2:
         return np.broadcast_to(weighted.sum((0, 1)) / max(weight.sum(), 1e-6), weighted.shape).astype(np.float32)
     half = (weight.shape[1] + 1) // 2, (weight.shape[0] + 1) // 2
@@ -179,14 +167,14 @@ def _continued(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
 
 
 def _matched(image: np.ndarray, at: TexelPartners) -> np.ndarray:
-    """The source map made smaller where it is finer than the target's texels, lest they skip some of it."""
+    """Shrink a source map that is finer than the target's texels, so that no detail is skipped."""
     step = np.linalg.norm(np.diff(at.uv[::2], axis=1) * [image.shape[1], image.shape[0]], axis=-1)
     step = float(np.nanmedian(step)) if np.isfinite(step).any() else 1.0
     return images.resize(image, round(image.shape[1] / step), round(image.shape[0] / step)) if step > 1.3 else image
 
 
 def _rows(mesh: Mesh, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """The first and the last row [F] that each triangle can touch."""
+    """First and last row [F] that each triangle can touch."""
     v = (1 - mesh.uvs[mesh.face_uvs][..., 1]) * size
     return np.floor(v.min(1)) - 1, np.ceil(v.max(1)) + 1
 
@@ -194,8 +182,10 @@ def _rows(mesh: Mesh, size: int) -> tuple[np.ndarray, np.ndarray]:
 def _turn(
     source: Source, face: np.ndarray, bary: np.ndarray, t: np.ndarray, b: np.ndarray, n: np.ndarray
 ) -> np.ndarray:
-    """Angles [N] from the target's tangent t to the source's at face, bary, towards b; the source's normal is first
-    taken to the target's n [N, 3] by the smallest rotation."""
+    """Angles [N] from the target's tangent t to the source's at face, bary, towards b.
+
+    The source's normal is first rotated to the target's n [N, 3] by the smallest rotation.
+    """
     tangent, _, normal = surfaces.frames(
         source.surface.normals, source.mesh.faces, source.tangent, source.hand, face, bary
     )

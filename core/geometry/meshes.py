@@ -22,7 +22,7 @@ OWN_OBJ = re.compile(
     r"((?:v(?: -?[0-9]+\.[0-9]+){3}\n)++)((?:vt(?: -?[0-9]+\.[0-9]+){2}\n)++)"
     r"((?:f(?: [0-9]{1,9}/[0-9]{1,9}){3}\n)++)"
 )
-"""What `write_obj` makes of a mesh with UVs."""
+"""OBJ text as `write_obj` makes it of a mesh with UVs."""
 
 
 @dataclass(frozen=True)
@@ -39,13 +39,13 @@ class Mesh:
     face_uvs: np.ndarray | None = None
 
     def moved(self, vertices: np.ndarray) -> Mesh:
-        """The same topology at other positions."""
+        """Return the same topology at other positions."""
         assert vertices.shape == self.vertices.shape, vertices.shape
         return replace(self, vertices=np.asarray(vertices, np.float64))
 
 
 def joined(meshes: list[Mesh]) -> Mesh:
-    """Several meshes as one, without UVs; the triangles of the first come first."""
+    """Join meshes into one without UVs, triangles in order."""
     first = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
     return Mesh(
         np.concatenate([mesh.vertices for mesh in meshes]),
@@ -54,22 +54,26 @@ def joined(meshes: list[Mesh]) -> Mesh:
 
 
 def vertex_uvs(mesh: Mesh) -> np.ndarray:
-    """[V, 2]: of each vertex one of its UVs."""
+    """Return one UV of each vertex, [V, 2]."""
     uvs = np.zeros((len(mesh.vertices), 2))
     uvs[mesh.faces] = mesh.uvs[mesh.face_uvs]
     return uvs
 
 
-def face_normals(mesh: Mesh) -> np.ndarray:
-    """Unit normals [F, 3]; zero for a degenerate triangle."""
+def crosses(mesh: Mesh) -> np.ndarray:
+    """Return each triangle's normal times twice its area, [F, 3]."""
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
-    return unit(np.cross(b - a, c - a))
+    return np.cross(b - a, c - a)
+
+
+def face_normals(mesh: Mesh) -> np.ndarray:
+    """Return unit normals [F, 3]; zero for a degenerate triangle."""
+    return unit(crosses(mesh))
 
 
 def vertex_normals(mesh: Mesh) -> np.ndarray:
-    """Area-weighted unit normals [V, 3]."""
-    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
-    weighted = np.cross(b - a, c - a)
+    """Return area-weighted unit normals [V, 3]."""
+    weighted = crosses(mesh)
     total = np.zeros_like(mesh.vertices)
     for i in range(3):
         np.add.at(total, mesh.faces[:, i], weighted)
@@ -77,50 +81,38 @@ def vertex_normals(mesh: Mesh) -> np.ndarray:
 
 
 def read_obj(path: Path) -> Mesh:
-    """Triangles and triangulated polygons with their UVs. Raises Problem for a file without faces, and for one that is
-    damaged: a line without its numbers, positions that are no numbers, faces with vertices that are not there."""
-    vertices, uvs, faces, face_uvs, polygons, known = [], [], [], [], [], {}
-    text = open_mesh(Path(path), MOST_OBJ_BYTES).decode("utf-8-sig", "replace")
+    """Read triangles and polygons, triangulated, with their UVs.
+
+    Raises Problem for a file without faces, and for damage: lines without numbers, positions that are not finite, faces
+    with missing vertices.
+    """
+    path = Path(path)
+    text = open_mesh(path, MOST_OBJ_BYTES).decode("utf-8-sig", "replace")
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     if (own := _read_own(text)) is not None:
-        return _sound(Path(path), own)
-    for number, line in enumerate(text.replace("\\\n", " ").split("\n"), 1):
-        key, *words = line.split() or [""]
-        try:
-            if key == "v":
-                x, y, z = words[:3]
-                vertices.append((x, y, z))
-            elif key == "vt":
-                uvs.append((words[0], words[1] if len(words) > 1 else "0"))
-            elif key == "f":
-                # most corners are written six times; what counts back depends on where it stands, and is not kept
-                corners = [known.get(word) or _corner(word, len(vertices), len(uvs), known) for word in words]
-                if len(corners) < 3:
-                    raise ValueError
-                polygons.append(len(corners) - 2)
-                for i in range(1, len(corners) - 1):
-                    triangle = corners[0], corners[i], corners[i + 1]
-                    faces.append([c[0] for c in triangle])
-                    face_uvs.append([c[1] for c in triangle])
-        except (ValueError, IndexError):
-            raise damaged(Path(path), f"line {number} is {line.strip()!r:.60}") from None
-    if not faces:
+        return _sound(path, own)
+    vertices, uvs, polygons = _parse(path, text)
+    if not polygons:
         raise Problem(f"{path} holds no faces.", "Choose an OBJ file with a mesh in it.")
-    has_uvs = len(uvs) > 0 and min(map(min, face_uvs)) >= 0
+    # each polygon becomes a fan about its first corner; a corner is (vertex, UV)
+    fans = [(p[0], b, c) for p in polygons for b, c in zip(p[1:], p[2:], strict=False)]
     try:
+        corners = np.array(fans, np.int64)  # [F, 3, 2]
+        faces, face_uvs = corners[..., 0].copy(), corners[..., 1].copy()
+        has_uvs = len(uvs) > 0 and face_uvs.min() >= 0
         mesh = Mesh(
             np.array(vertices, np.float64).reshape(-1, 3),
-            np.array(faces, np.int64),
+            faces,
             np.array(uvs, np.float64) if has_uvs else None,
-            np.array(face_uvs, np.int64) if has_uvs else None,
+            face_uvs if has_uvs else None,
         )
     except (ValueError, OverflowError) as error:
-        raise damaged(Path(path), str(error)) from error
-    return _unfolded(_sound(Path(path), mesh), np.array(polygons))
+        raise damaged(path, str(error)) from error
+    return _unfolded(_sound(path, mesh), np.array([len(p) - 2 for p in polygons]))
 
 
 def read_obj_vertices(path: Path) -> np.ndarray:
-    """The vertices [V, 3] of an OBJ, without its faces. Raises Problem as `read_obj` does."""
+    """Read the vertices [V, 3] of an OBJ without its faces. Raises Problem as `read_obj` does."""
     path = Path(path)
     text = open_mesh(path, MOST_OBJ_BYTES).decode("utf-8-sig", "replace")
     try:
@@ -135,8 +127,10 @@ def read_obj_vertices(path: Path) -> np.ndarray:
 
 
 def write_obj(path: Path, mesh: Mesh) -> None:
-    """Positions to a micrometre, UVs to 1e-6, atomically. Raises Problem, and writes nothing, for a mesh without faces
-    or with values that are no numbers."""
+    """Write positions to a micrometre and UVs to 1e-6, atomically.
+
+    Raises Problem, and writes nothing, for a mesh without faces or with values that are not finite.
+    """
     _check_written(path, mesh)
     lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in mesh.vertices]
     if mesh.uvs is not None:
@@ -151,17 +145,16 @@ def write_obj(path: Path, mesh: Mesh) -> None:
 
 
 def read_ply(path: Path, or_points: bool = False) -> Mesh:
-    """The triangles of a PLY file, ASCII or binary of either byte order; polygons are cut into triangles. Raises
-    Problem for a damaged one.
+    """Read the triangles of a PLY, ASCII or binary of either byte order; polygons are triangulated.
 
-    `or_points`: one that holds points alone gives a mesh without faces, and is no damage.
+    Raises Problem for a damaged file. `or_points`: points alone give a mesh without faces.
     """
     path = Path(path)
     content = open_mesh(path, MOST_PLY_BYTES)
     check_ply(path, content)
     try:
         loaded = trimesh.load(io.BytesIO(content), file_type="ply", process=False, force=None if or_points else "mesh")
-        # what is empty has neither
+        # an empty file has neither
         points, faces = (getattr(loaded, name, np.zeros((0, 3))) for name in ("vertices", "faces"))
         mesh = Mesh(np.asarray(points, np.float64).reshape(-1, 3), np.asarray(faces, np.int64))
     except (
@@ -180,8 +173,7 @@ def read_ply(path: Path, or_points: bool = False) -> Mesh:
 
 
 def write_ply(path: Path, mesh: Mesh) -> None:
-    """Binary PLY, atomically. Raises Problem, and writes nothing, for a mesh without faces or with values that are no
-    numbers."""
+    """Write a binary PLY, atomically. Raises Problem as `write_obj` does."""
     _check_written(path, mesh)
     with replacing(path) as temporary:
         triangles = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
@@ -189,20 +181,18 @@ def write_ply(path: Path, mesh: Mesh) -> None:
 
 
 def write_points(path: Path, points: np.ndarray) -> None:
-    """Points [N, 3] without faces as a binary PLY, atomically."""
+    """Write points [N, 3] without faces as a binary PLY, atomically."""
     header = (
-        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\nproperty float x\nproperty float "
-        "y\nproperty float z\n"
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
+        "property float x\nproperty float y\nproperty float z\n"
+        "element face 0\nproperty list uchar int vertex_indices\nend_header\n"
     )
     with replacing(path) as temporary:
-        temporary.write_bytes(
-            f"{header}element face 0\nproperty list uchar int vertex_indices\nend_header\n".encode()
-            + points.astype("<f4").tobytes()
-        )
+        temporary.write_bytes(header.encode() + points.astype("<f4").tobytes())
 
 
 def _sound(path: Path, mesh: Mesh) -> Mesh:
-    """The mesh itself. Raises Problem where it cannot be one."""
+    """Return the mesh. Raises Problem if its arrays do not make one."""
     if fault := find_fault(mesh.vertices, mesh.faces, mesh.uvs, mesh.face_uvs):
         raise damaged(path, fault)
     return mesh
@@ -217,14 +207,13 @@ def _check_written(path: Path, mesh: Mesh) -> None:
             f"{path} was not written: {fault}.",
             advise_remaking(
                 Path(path),
-                "Run again, and if it stays, report it with the logs of this capture. Finished stages are kept.",
+                "Run again; if it happens again, report it with this capture's logs. Finished stages are kept.",
             ),
         )
 
 
 def _read_own(text: str) -> Mesh | None:
-    """The mesh of an OBJ as `write_obj` makes it, which each stage reads once: three times faster than line by line.
-    None for any other text."""
+    """Parse an OBJ as `write_obj` makes it, three times faster than line by line; None for any other text."""
     written = OWN_OBJ.fullmatch(text)
     if written is None:
         return None
@@ -234,15 +223,38 @@ def _read_own(text: str) -> Mesh | None:
     )
     corners = np.array(list(map(int, written[3].replace("f", "").replace("/", " ").split())), np.int64) - 1
     if corners.min() < 0:
-        return None  # an index from zero: the other reader tells its line
+        return None  # an index of zero, which the other reader reports by line
     faces, face_uvs = np.moveaxis(corners.reshape(-1, 3, 2), 2, 0).copy()
     return Mesh(vertices, faces, uvs, face_uvs)
 
 
+def _parse(path: Path, text: str) -> tuple[list, list, list]:
+    """Return the vertices and UVs of an OBJ, as text, and its polygons as lists of corners."""
+    vertices, uvs, polygons, corner_of = [], [], [], {}
+    for number, line in enumerate(text.replace("\\\n", " ").split("\n"), 1):
+        key, *words = line.split() or [""]
+        try:
+            if key == "v":
+                x, y, z = words[:3]
+                vertices.append((x, y, z))
+            elif key == "vt":
+                uvs.append((words[0], words[1] if len(words) > 1 else "0"))
+            elif key == "f":
+                _, _, _, *_ = words  # three corners at least
+                # most corners occur six times
+                polygons.append(
+                    [corner_of.get(word) or _corner(word, len(vertices), len(uvs), corner_of) for word in words]
+                )
+        except (ValueError, IndexError):
+            raise damaged(path, f"line {number} is {line.strip()!r:.60}") from None
+    return vertices, uvs, polygons
+
+
 def _corner(word: str, vertices: int, uvs: int, corner_of: dict[str, tuple[int, int]]) -> tuple[int, int]:
-    """A corner of an OBJ's face, "3/7/1" or "-1//-1", as indices from zero of its vertex and UV (-1: it has none);
-    `vertices` and `uvs` have been read so far, from which negative numbers count back. Raises ValueError for what is
-    none."""
+    """Parse a corner of a face, "3/7/1" or "-1//-1": indices from zero of its vertex and UV (-1: none).
+
+    Negative numbers count back from the `vertices` and `uvs` read so far. Raises ValueError if it is not a corner.
+    """
     vertex, uv = (word.split("/") + [""])[:2]
     indices = [
         int(text) - 1 if not text.startswith("-") else int(text) + count
@@ -250,21 +262,19 @@ def _corner(word: str, vertices: int, uvs: int, corner_of: dict[str, tuple[int, 
     ]
     if indices[0] < 0 or uv and indices[1] < 0:
         raise ValueError(word)
-    if "-" not in word:
+    if "-" not in word:  # the meaning of a negative number depends on where it stands
         corner_of[word] = indices[0], indices[1]
     return indices[0], indices[1]
 
 
 def _unfolded(mesh: Mesh, counts: np.ndarray) -> Mesh:
-    """The mesh with the fans of hollow polygons begun at a corner from which none of their triangles lies outside,
-    where there is one.
+    """Start the fans of hollow polygons at a corner from which all triangles lie inside, if there is one.
 
-    counts [P]: triangles of each polygon, which lie one after the other.
+    counts [P]: consecutive triangles of each polygon.
     """
     if counts.max() < 2:
         return mesh
-    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
-    across = np.cross(b - a, c - a)
+    across = crosses(mesh)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     whole = np.add.reduceat(across, starts, axis=0)
     hollow = np.logical_or.reduceat((across * np.repeat(whole, counts, 0)).sum(1) < 0, starts)
@@ -289,5 +299,5 @@ def _unfolded(mesh: Mesh, counts: np.ndarray) -> Mesh:
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
-    """[..., 3], each of length 1; zeros stay."""
+    """Return [..., 3] scaled to length 1; zeros stay."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-20)

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""COLMAP models: the one door to their files. Binary ones are walked through record by record before pycolmap reads
-them, for it believes every count.
+"""COLMAP models: the one place that reads and writes their files.
 
-Formats: COLMAP's documentation, "Output format". Numbers are little-endian.
+Binary files are walked record by record before pycolmap reads them, because it trusts every count. Formats: COLMAP's
+documentation, "Output format"; little-endian.
 """
 
 from __future__ import annotations
@@ -23,17 +23,15 @@ PARAMS = {
     for name, number in pycolmap.CameraModelId.__members__.items()
     if name != "INVALID"
 }
-"""How many parameters each camera model has, by its number."""
+"""Number of a camera model -> count of its parameters."""
 MOST_MODEL_BYTES = 1 << 30
-"""Of one file, binary or text; a model of 300 frames has 0.1 GB, and pycolmap takes about five times a file's size."""
+"""Of one file; 300 frames take 0.1 GB, and pycolmap needs about five times a file's size in memory."""
 NAME_BYTES = 4096
-"""The longest path that a system has."""
 LONGEST_SIDE_PX = 1 << 16
-"""Pixels: beyond what any picture file here may have."""
 
 
 class _Cursor:
-    """A place in a file's bytes. Every method raises ValueError where the file ends before what it should hold."""
+    """A position in a file's bytes. Every method raises ValueError if the file ends early."""
 
     def __init__(self, content: bytes):
         self.content, self.at = content, 0
@@ -51,7 +49,7 @@ class _Cursor:
     def skip_name(self) -> None:
         end = self.content.find(b"\0", self.at, self.at + NAME_BYTES)
         if end < 0:
-            raise ValueError("a name in it does not end")
+            raise ValueError("it has a name without an end")
         self.at = end + 1
 
 
@@ -59,18 +57,18 @@ def _camera(file: _Cursor) -> None:
     file.skip(4)
     model = file.take("<i")
     if model not in PARAMS:
-        raise ValueError(f"it has a camera model of number {model}")
+        raise ValueError(f"it has an unknown camera model, number {model}")
     file.skip(16 + 8 * PARAMS[model])
 
 
 def _image(file: _Cursor) -> None:
-    file.skip(4 + 7 * 8 + 4)  # number, rotation and translation, number of its camera
+    file.skip(4 + 7 * 8 + 4)  # image, rotation and translation, camera
     file.skip_name()
     file.skip(24 * file.take("<Q"))
 
 
 def _point(file: _Cursor) -> None:
-    file.skip(8 + 3 * 8 + 3 + 8)  # number, position, colour, error
+    file.skip(8 + 3 * 8 + 3 + 8)  # point, position, colour, error
     file.skip(8 * file.take("<Q"))
 
 
@@ -91,13 +89,15 @@ def _frame(file: _Cursor) -> None:
 
 
 RECORDS = {"cameras": _camera, "images": _image, "points3D": _point, "rigs": _rig, "frames": _frame}
-"""File -> what passes over one of its records. COLMAP before 3.12 wrote no rigs and frames."""
+"""File -> function that skips one of its records. COLMAP before 3.12 wrote no rigs and frames."""
 
 
 def read_model(folder: Path) -> pycolmap.Reconstruction:
-    """The model in a folder, binary or text. Raises OSError where it cannot be opened, ValueError where it is damaged:
-    what its records say does not fit the files' sizes, cameras or poses that are no finite numbers, a lens without a
-    focal length."""
+    """Read the model in a folder, binary or text.
+
+    Raises OSError if it cannot be opened, ValueError if it is damaged: records that do not match the file's size,
+    cameras or poses that are not finite, a lens without a focal length.
+    """
     ending = "bin" if (folder / "cameras.bin").is_file() and (folder / "images.bin").is_file() else "txt"
     for name, record in RECORDS.items():
         file = folder / f"{name}.{ending}"
@@ -111,29 +111,12 @@ def read_model(folder: Path) -> pycolmap.Reconstruction:
         model = pycolmap.Reconstruction(str(folder))
     except (KeyError, IndexError, RuntimeError) as error:
         raise ValueError(str(error).splitlines()[0]) from error
-    for image in model.images.values():
-        pose = pose_of(image) if image.has_pose else None
-        if image.camera_id not in model.cameras:
-            raise ValueError(f"the camera of {image.name} is missing")
-        if pose is not None and not (
-            np.isfinite(pose.rotation.quat).all() and np.isfinite(pose.translation).all() and np.any(pose.rotation.quat)
-        ):
-            raise ValueError(f"the pose of {image.name} is no place")
-    for number, camera in model.cameras.items():
-        lengths = [camera.params[i] for i in camera.focal_length_idxs()]
-        if not (
-            0 < camera.width <= LONGEST_SIDE_PX
-            and 0 < camera.height <= LONGEST_SIDE_PX
-            and np.isfinite(camera.params).all()
-            and min(lengths) > 0
-        ):
-            raise ValueError(f"the lens of camera {number} makes no sense")
+    _check(model)
     return model
 
 
 def write_model(folder: Path, model: pycolmap.Reconstruction) -> None:
-    """Writes a model's binary files. Raises OSError where they are not whole afterwards: pycolmap says nothing of a
-    disk that is full."""
+    """Write a model's binary files. Raises OSError if they are incomplete: pycolmap does not report a full disk."""
     model.write_binary(str(folder))
     try:
         for name, record in RECORDS.items():
@@ -143,12 +126,33 @@ def write_model(folder: Path, model: pycolmap.Reconstruction) -> None:
 
 
 def pose_of(image: pycolmap.Image) -> pycolmap.Rigid3d:
-    """What takes points of the world into an image's camera; pycolmap's versions give it in two ways."""
+    """Return the transform from the world into an image's camera, whatever pycolmap's version."""
     return image.cam_from_world() if callable(image.cam_from_world) else image.cam_from_world
 
 
+def _check(model: pycolmap.Reconstruction) -> None:
+    """Raise ValueError for cameras, poses or lenses that are missing or not valid."""
+    for image in model.images.values():
+        pose = pose_of(image) if image.has_pose else None
+        if image.camera_id not in model.cameras:
+            raise ValueError(f"the camera of {image.name} is missing")
+        if pose is not None and not (
+            np.isfinite(pose.rotation.quat).all() and np.isfinite(pose.translation).all() and np.any(pose.rotation.quat)
+        ):
+            raise ValueError(f"the pose of {image.name} is not finite")
+    for number, camera in model.cameras.items():
+        lengths = [camera.params[i] for i in camera.focal_length_idxs()]
+        if not (
+            0 < camera.width <= LONGEST_SIDE_PX
+            and 0 < camera.height <= LONGEST_SIDE_PX
+            and np.isfinite(camera.params).all()
+            and min(lengths) > 0
+        ):
+            raise ValueError(f"the lens of camera {number} is not valid")
+
+
 def _walk(path: Path, record) -> None:
-    """Raises ValueError where the file does not hold just the records that it promises."""
+    """Raise ValueError if the file does not hold exactly the records that it promises."""
     file = _Cursor(require_regular(path).read_bytes())
     try:
         for _ in range(file.take("<Q")):
@@ -156,4 +160,4 @@ def _walk(path: Path, record) -> None:
     except ValueError as error:
         raise ValueError(f"{path.name}: {error}") from error
     if file.at != len(file.content):
-        raise ValueError(f"{path.name}: it goes on after its last record")
+        raise ValueError(f"{path.name}: it continues after its last record")

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mesh to pixels: in UV space by rasterising, in a camera by ray casting; and what a camera sees of it.
+"""Meshes to pixels: in UV space by rasterising, in a camera by ray casting; and visibility.
 
-Row 0 of a UV map is its top: texel (row, column) of an S x S map has its centre at
-u = (column + 0.5) / S, v = 1 - (row + 0.5) / S.
+Row 0 of a UV map is its top: texel (row, column) of an S x S map has its centre at u = (column + 0.5) / S, v = 1 - (row
++ 0.5) / S.
 """
 
 from __future__ import annotations
@@ -19,17 +19,16 @@ from .meshes import Mesh
 from .views import View
 
 BENT_SIDE_SHARE = 0.01
-"""Share of a picture's sides by which a lens may bend a mesh's edge out of the box of its vertices."""
+"""Margin for lenses that bend a mesh's edge out of the box of its vertices, as a share of the picture's sides."""
 TEXELS_AT_ONCE = 60_000
-"""Texels that are rasterised in one go: in a small map those of many triangles, and one triangle after the other would
-take up to a hundred times as long; more than the processor's cache holds is no faster."""
+"""Texels of many triangles are rasterised together, up to a hundred times faster than one by one; more than fits the
+processor's cache gains nothing."""
 
 
 def rasterize_uv(mesh: Mesh, size: int, rows: tuple[int, int] | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Which triangle covers each texel's centre: face index int32 [S, S] (-1: none) and barycentric coordinates float32
-    [S, S, 3].
+    """Return the triangle at each texel's centre, int32 [S, S] (-1: none), and barycentric float32 [S, S, 3].
 
-    `rows` (first, end): that strip of the map only, [end - first, S].
+    `rows` (first, end): only that strip of the map, [end - first, S].
     """
     first, end = rows or (0, size)
     # [F, 3, 2] in texels: x = column, y = row
@@ -47,7 +46,7 @@ def rasterize_uv(mesh: Mesh, size: int, rows: tuple[int, int] | None = None) -> 
         wb = ((cx - x) * (ay - y) - (ax - x) * (cy - y)) / twice
         wc = 1 - wa - wb
         inside = (wa >= -1e-9) & (wb >= -1e-9) & (wc >= -1e-9)
-        # of triangles that lie over each other the last counts, as NumPy writes what comes last
+        # of overlapping triangles the last one wins, as in NumPy's assignment
         face[y[inside], x[inside]] = f[inside]
         bary[y[inside], x[inside]] = np.stack([wa, wb, wc], -1)[inside]
     return face, bary
@@ -56,8 +55,7 @@ def rasterize_uv(mesh: Mesh, size: int, rows: tuple[int, int] | None = None) -> 
 def _texels(
     triangles: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """All texels of the boxes [N, 2] of triangles [N], one box after the other: triangle, column and row of each, some
-    TEXELS_AT_ONCE at a time."""
+    """Yield triangle, column and row of all texels in the boxes low, high [N, 2] of triangles [N], in chunks."""
     sides = high - low + 1
     ends = np.cumsum(sides.prod(1))
     first, before = 0, 0
@@ -72,28 +70,21 @@ def _texels(
 
 
 def interpolate(vertex_values: np.ndarray, corners: np.ndarray, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
-    """Values of a mesh's vertices at raster samples.
+    """Interpolate vertex values [V, C] at raster samples: [..., C], zero where face < 0.
 
-    Parameters
-    ----------
-    vertex_values : [V, C]
-    corners : [F, 3], the rows of each triangle
-    face : [...], the triangle at each sample, -1 for none
-    bary : [..., 3], where in it
-
-    Returns
-    -------
-    [..., C], zero where face < 0.
+    corners [F, 3] are the vertices of each triangle, face [...] and bary [..., 3] the samples.
     """
-    of = corners[np.maximum(face, 0)]
-    # a sum over an axis of three takes several times as long
-    first, second, third = (vertex_values[of[..., k]] * bary[..., k, None] for k in range(3))
+    vertices = corners[np.maximum(face, 0)]
+    # several times faster than a sum over an axis of three
+    first, second, third = (vertex_values[vertices[..., k]] * bary[..., k, None] for k in range(3))
     return (first + second + third) * (face >= 0)[..., None]
 
 
 def bleed(image: np.ndarray, valid: np.ndarray) -> np.ndarray:
-    """[H, W(, C)] with every texel that is not `valid` [H, W] given the value of the nearest that is, so that filtering
-    meets no black seam."""
+    """Give every texel of [H, W(, C)] that is not `valid` [H, W] the value of the nearest valid one.
+
+    Filtering then meets no black seam.
+    """
     if valid.all() or not valid.any():
         return image
     _, labels = cv2.distanceTransformWithLabels(
@@ -112,8 +103,10 @@ class RayCaster:
         self._intersector = RayMeshIntersector(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False))
 
     def first_hits(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """origins and unit directions [N, 3] -> face int64 [N] (-1: miss), barycentric [N, 3], distance [N] in metres
-        (inf: miss)."""
+        """Cast rays from origins along unit directions [N, 3].
+
+        Returns face int64 [N] (-1: miss), barycentric [N, 3] and distance [N] in metres (inf: miss).
+        """
         count = len(directions)
         face, bary, distance = np.full(count, -1), np.zeros((count, 3)), np.full(count, np.inf)
         if count:
@@ -126,38 +119,30 @@ class RayCaster:
         return face, bary, distance
 
     def blocked(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """bool [N]: whether a ray hits anything."""
+        """Return whether each ray hits anything, bool [N]."""
         return self._intersector.intersects_any(origins, directions) if len(directions) else np.zeros(0, bool)
 
 
 def visible_from(
     caster: RayCaster, points: np.ndarray, normals: np.ndarray, centre: np.ndarray, offset: float = 5e-4
 ) -> np.ndarray:
-    """Whether surface points face a place and nothing lies between.
+    """Return whether points [N, 3] with unit normals face a `centre` [3] and nothing of `caster` lies between.
 
-    Parameters
-    ----------
-    caster : of the surface
-    points : [N, 3] on it, in metres
-    normals : [N, 3], unit
-    centre : [3], the place
-    offset : metres by which rays start off the surface
-
-    Returns
-    -------
-    bool [N].
+    Rays start `offset` metres off the surface.
     """
     towards = centre - points
     directions = towards / np.linalg.norm(towards, axis=1, keepdims=True)
     facing = (directions * normals).sum(1) > 0
-    seen = np.zeros(len(points), bool)
-    seen[facing] = ~caster.blocked(points[facing] + offset * normals[facing], directions[facing])
-    return seen
+    visible = np.zeros(len(points), bool)
+    visible[facing] = ~caster.blocked(points[facing] + offset * normals[facing], directions[facing])
+    return visible
 
 
 def render_view(caster: RayCaster, view: View, scale: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The mesh through a view's camera at `scale` times its size: face int64 [h, w] (-1: background), bary [h, w, 3],
-    distance [h, w] in metres."""
+    """Render the mesh through a view's camera at `scale` times its size.
+
+    Returns face int64 [h, w] (-1: background), barycentric [h, w, 3] and distance [h, w] in metres.
+    """
     width, height = round(view.width * scale), round(view.height * scale)
     face, bary, distance = np.full((height, width), -1), np.zeros((height, width, 3)), np.full((height, width), np.inf)
     box = _box(caster.mesh, view, width, height)
@@ -171,8 +156,7 @@ def render_view(caster: RayCaster, view: View, scale: float = 1.0) -> tuple[np.n
 
 
 def _box(mesh: Mesh, view: View, width: int, height: int) -> tuple[slice, slice]:
-    """The rows and columns of a picture of that size within which a view shows the mesh; all where a part of it lies
-    behind the camera."""
+    """Rows and columns of a picture within which a view shows the mesh; all if part of it is behind the camera."""
     pixels, _ = view.project(mesh.vertices)
     if not np.isfinite(pixels).all():
         return slice(0, height), slice(0, width)
@@ -186,21 +170,17 @@ def _box(mesh: Mesh, view: View, width: int, height: int) -> tuple[slice, slice]
 
 
 def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """Bilinear values of [H, W(, C)] at pixels [N, 2] (pixel centres at +0.5; clamped at the border)."""
+    """Sample [H, W(, C)] bilinearly at pixels [N, 2] (pixel centres at +0.5; clamped at the border)."""
     xy = (np.asarray(pixels, np.float32) - 0.5).reshape(-1, 1, 2)
+    image = np.ascontiguousarray(image, np.float32)
+    chunks = [xy[i : i + 32000] for i in range(0, len(xy), 32000)]  # cv2.remap takes fewer than 32767 rows
     out = [
-        cv2.remap(
-            np.ascontiguousarray(image, np.float32),
-            xy[i : i + 32000, :, 0],
-            xy[i : i + 32000, :, 1],
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
-        )
-        for i in range(0, len(xy), 32000)
-    ]  # cv2.remap takes fewer than 32767 rows
+        cv2.remap(image, chunk[..., 0], chunk[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        for chunk in chunks
+    ]
     return np.concatenate(out)[:, 0] if out else np.zeros((0, *image.shape[2:]), np.float32)
 
 
 def sample_uv(image: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """As `sample` of a square map [S, S, ...], at UVs [N, 2]."""
+    """Sample a square map [S, S, ...] bilinearly at UVs [N, 2]."""
     return sample(image, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * len(image))

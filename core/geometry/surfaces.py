@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From one surface to another that lies on it: partners of points, and the tangent frames in which normal maps are
-written.
+"""Partners of points on another surface, and the tangent frames in which normal maps are written.
 
-A partner is where the ray along a point's normal meets the other surface, or else the nearest point of it, and only
-where the two surfaces face the same way: the inside of a lip is no partner of the other lip.
+A partner is where the ray along a point's normal meets the other surface, or else its nearest point, and only where the
+two surfaces face the same way: the inside of a lip is not a partner of the other lip.
 """
 
 from __future__ import annotations
@@ -20,18 +19,18 @@ from scipy.spatial import cKDTree
 from .meshes import Mesh, unit, vertex_normals
 from .raster import RayCaster, interpolate
 
+SAME_WAY_COSINE = 0.3
+"""Surfaces face the same way if the cosine between their normals is larger."""
 CANDIDATE_COUNTS = (8, 64)
-"""How many samples near a point are looked at: at first, and where none of these will do."""
+"""Samples near a point that are tried first, and if none of these fits."""
 NEAR_SHARE = 0.25
-"""The first rays start this share of `farthest` off the surface: most partners lie within, and farther ones cost a
-search."""
+"""Start of the first rays, as a share of `farthest`: most partners lie within, farther ones need a search."""
 MOST_CUTS = 12
-"""Passes in which edges are cut in two: those of a head of eight metres, and not of one in millimetres."""
+"""Halvings of edges: enough for a head of eight metres, not for one in millimetres."""
 
 
 class Surface:
-    """A mesh on which partners are looked for. `spacing` in metres: how densely it is sampled for the search of nearest
-    points."""
+    """A mesh indexed for the search of partners; sampled every `spacing` metres for that of nearest points."""
 
     def __init__(self, mesh: Mesh, spacing: float = 0.002):
         self.mesh, self.normals = mesh, vertex_normals(mesh)
@@ -39,66 +38,37 @@ class Surface:
         self._tree = cKDTree(corners.mean(1))
         self._caster = RayCaster(mesh)
 
-    def find_partners(
-        self, points: np.ndarray, normals: np.ndarray, farthest: float, cosine: float = 0.3
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """The partners of points on another surface.
+    def find_partners(self, points: np.ndarray, normals: np.ndarray, farthest: float) -> tuple[np.ndarray, np.ndarray]:
+        """Find the partners of points [N, 3] with unit normals on another surface, at most `farthest` metres away.
 
-        Parameters
-        ----------
-        points : [N, 3], in metres
-        normals : [N, 3], unit
-        farthest : metres within which a partner lies
-        cosine : of the two normals' angle; below it they do not face the same way
-
-        Returns
-        -------
-        Triangle int64 [N], -1 for no partner, and barycentric [N, 3].
+        Returns triangle int64 [N] (-1: none) and barycentric [N, 3].
         """
         lift = NEAR_SHARE * farthest
-        face, bary, distance = self.cast_rays(points + lift * normals, -normals, normals, cosine)
+        face, bary, distance = self.cast_rays(points + lift * normals, -normals, normals)
         face = np.where(distance < 2 * lift, face, -1)
         missed = np.flatnonzero(face < 0)
-        face[missed], bary[missed] = self.find_nearest(points[missed], normals[missed], farthest, cosine)
+        face[missed], bary[missed] = self.find_nearest(points[missed], normals[missed], farthest)
         return face, bary
 
     def cast_rays(
-        self, origins: np.ndarray, directions: np.ndarray, normals: np.ndarray, cosine: float = 0.3
+        self, origins: np.ndarray, directions: np.ndarray, normals: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """First hits of rays, without those where the surface does not face the way of `normals`.
-
-        Parameters
-        ----------
-        origins : [N, 3], in metres
-        directions : [N, 3], unit
-        normals : [N, 3], unit
-        cosine : as in `find_partners`
-
-        Returns
-        -------
-        As RayCaster.first_hits; of what is left out only the triangle is -1.
-        """
+        """Return first hits of rays as RayCaster does, but face -1 where the surface does not face as `normals`."""
         face, bary, distance = self._caster.first_hits(origins, directions)
-        return np.where(self._agree(face, bary, normals, cosine), face, -1), bary, distance
+        return np.where(self._agree(face, bary, normals, SAME_WAY_COSINE), face, -1), bary, distance
 
     def find_nearest(
-        self, points: np.ndarray, normals: np.ndarray, farthest: float, cosine: float = 0.3
+        self, points: np.ndarray, normals: np.ndarray, farthest: float, cosine: float = SAME_WAY_COSINE
     ) -> tuple[np.ndarray, np.ndarray]:
-        """As `find_partners`, by distance alone.
-
-        Parameters
-        ----------
-        points, normals, farthest, cosine : as in `find_partners`
-        """
+        """Find partners by distance alone; `cosine` between two normals from which they face the same way."""
         face, bary = self._nearest_of(CANDIDATE_COUNTS[0], points, normals, farthest, cosine)
-        missed = np.flatnonzero(face < 0)  # another sheet lies before the one that faces the same way
-        face[missed], bary[missed] = self._nearest_of(
-            CANDIDATE_COUNTS[1], points[missed], normals[missed], farthest, cosine
-        )
+        missed = np.flatnonzero(face < 0)  # another sheet may lie in front of the one that faces the same way
+        more = self._nearest_of(CANDIDATE_COUNTS[1], points[missed], normals[missed], farthest, cosine)
+        face[missed], bary[missed] = more
         return face, bary
 
     def _nearest_of(self, count: int, points, normals, farthest: float, cosine: float) -> tuple[np.ndarray, np.ndarray]:
-        """The best of the `count` samples nearest to each point."""
+        """Best of the `count` samples nearest to each point."""
         best_face, best_bary = np.full(len(points), -1), np.zeros((len(points), 3))
         _, index = self._tree.query(points, count, distance_upper_bound=farthest + 0.005)
         best = np.full(len(points), farthest)
@@ -109,13 +79,7 @@ class Surface:
             closest = trimesh.triangles.closest_point(corners, points[there])
             distance = np.linalg.norm(closest - points[there], axis=1)
             near = distance < best[there]
-            there, face, closest, distance, corners = (
-                there[near],
-                face[near],
-                closest[near],
-                distance[near],
-                corners[near],
-            )
+            there, face, closest, distance, corners = (each[near] for each in (there, face, closest, distance, corners))
             bary = np.clip(trimesh.triangles.points_to_barycentric(corners, closest), 0, 1)
             fits = self._agree(face, bary, normals[there], cosine)
             best[there[fits]], best_face[there[fits]], best_bary[there[fits]] = distance[fits], face[fits], bary[fits]
@@ -127,11 +91,10 @@ class Surface:
 
 
 def _divided(corners: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles [F, 3, 3] cut at the middles of their edges until none is longer than `longest`: their corners
-    [N, 3, 3], and of which triangle each is a part [N].
+    """Cut triangles [F, 3, 3] at the middles of edges longer than `longest`, until there are none.
 
-    The pieces and their order are those of trimesh's `subdivide_to_size`, which numbers all edges anew in each pass and
-    takes several times as long.
+    Returns the pieces' corners [N, 3, 3] and the triangle of each [N]. Pieces and order are those of trimesh's
+    `subdivide_to_size`, which renumbers all edges in each pass and is several times slower.
     """
     parent = np.arange(len(corners))
     for done in range(MOST_CUTS + 1):
@@ -169,18 +132,17 @@ def _divided(corners: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarra
 
 
 def welded(mesh: Mesh, tolerance: float = 1e-6) -> tuple[Mesh, np.ndarray]:
-    """The mesh with its open edges sewn where two of them, and no third, lie at one place (within `tolerance` of its
-    size), and for each of the old vertices the new one's index.
+    """Sew open edges where exactly two lie at one place; returns the mesh and the new index of each old vertex.
 
-    Files often split a mesh along its UV seams; its halves would come apart, and be shaded apart. What merely touches,
-    as a film of tears touches a lid, stays what it is.
+    `tolerance` is a share of the mesh's size. Files often split a mesh along its UV seams, and the halves would come
+    apart and be shaded apart. Surfaces that merely touch, as a film of tears and a lid, stay apart.
     """
     size = np.ptp(mesh.vertices, axis=0).max()
     _, place = np.unique(np.round(mesh.vertices / (tolerance * size)).astype(np.int64), axis=0, return_inverse=True)
     place = place.ravel()
     edges = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     swap = place[edges[:, 0]] > place[edges[:, 1]]
-    # both ends sorted by place, so that partners' ends stand in one order
+    # both ends sorted by place, so that partners' ends have one order
     edges = np.where(swap[:, None], edges[:, ::-1], edges)
     _, group, uses = np.unique(place[edges], axis=0, return_inverse=True, return_counts=True)
     group = group.ravel()
@@ -194,8 +156,7 @@ def welded(mesh: Mesh, tolerance: float = 1e-6) -> tuple[Mesh, np.ndarray]:
 
 
 def tangents(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """Unit tangents [F, 3, 3] per triangle and corner, along growing u and across the vertex normal, and handedness [F]
-    (-1: mirrored in UV space).
+    """Return unit tangents [F, 3, 3] per corner, along growing u, and handedness [F] (-1: mirrored in UV space).
 
     Averaged over the triangles that share a corner's vertex and UV, as MikkTSpace does (Mikkelsen 2008).
     """
@@ -209,34 +170,19 @@ def tangents(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     _, group = np.unique(key, axis=0, return_inverse=True)
     group = group.ravel()
     total = np.zeros((group.max() + 1, 3))
-    np.add.at(
-        total,
-        group,
-        np.repeat(along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-20), 3, 0)
-        * _angles(corners).reshape(-1, 1),
-    )
+    np.add.at(total, group, np.repeat(unit(along), 3, 0) * _angles(corners).reshape(-1, 1))
     normal = vertex_normals(mesh)[mesh.faces.ravel()]
     tangent = total[group]
     tangent -= (tangent * normal).sum(1, keepdims=True) * normal
-    return (tangent / np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-20)).reshape(-1, 3, 3), hand
+    return unit(tangent).reshape(-1, 3, 3), hand
 
 
 def frames(
     normals: np.ndarray, faces: np.ndarray, tangent: np.ndarray, hand: np.ndarray, face: np.ndarray, bary: np.ndarray
 ):
-    """Tangent, bitangent and normal at samples of a mesh.
+    """Return tangent, bitangent and normal [N, 3] at samples face, bary of a mesh: unit and orthogonal.
 
-    Parameters
-    ----------
-    normals : [V, 3], unit
-    faces : [F, 3]
-    tangent, hand : from `tangents`
-    face : [N], the triangle of each sample, all >= 0
-    bary : [N, 3], where in it
-
-    Returns
-    -------
-    [N, 3] each, unit and square to each other.
+    normals [V, 3] are unit, faces [F, 3], tangent and hand from `tangents`.
     """
     n = unit((normals[faces[face]] * bary[..., None]).sum(1))
     t = (tangent[face] * bary[..., None]).sum(1)
@@ -245,7 +191,7 @@ def frames(
 
 
 def _angles(corners: np.ndarray) -> np.ndarray:
-    """Angles [F, 3] at the corners [F, 3, 3] of triangles, radians."""
+    """Angles [F, 3] in radians at the corners [F, 3, 3] of triangles."""
     angles = []
     for i in range(3):
         a, b = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]

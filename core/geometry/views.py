@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Calibrated views: the frames with the cameras that took them, as every stage after `cameras` reads them.
+"""Calibrated views: the frames with their cameras, as every stage after `cameras` reads them.
 
 A COLMAP camera looks along its +z, x to the right, y down; pixel (0.5, 0.5) is the centre of the upper left one.
 """
@@ -24,7 +24,7 @@ from .models import pose_of, read_model
 
 @dataclass(frozen=True)
 class View:
-    """One registered frame. rotation [3, 3] and translation [3] take world points (metres) into the camera."""
+    """A registered frame. rotation [3, 3] and translation [3] take world points (metres) into the camera."""
 
     name: str
     path: Path
@@ -52,12 +52,14 @@ class View:
         return self.rotation[2]
 
     def read(self) -> np.ndarray:
-        """The picture, sRGB [H, W, 3]. Raises Problem where it cannot be read."""
+        """Return the picture, sRGB [H, W, 3]. Raises Problem if it cannot be read."""
         return images.read_srgb(self.path)
 
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """World points [N, 3] -> pixels [N, 2] (lens distortion applied; nan behind the camera) and depths [N] in
-        metres."""
+        """Project world points [N, 3] to pixels [N, 2] and depths [N] in metres.
+
+        Lens distortion is applied; pixels are nan behind the camera.
+        """
         local = np.asarray(points, np.float64) @ self.rotation.T + self.translation
         depth = local[:, 2]
         pixels = np.full((len(local), 2), np.nan)
@@ -67,21 +69,22 @@ class View:
         return pixels, depth
 
     def rays(self, pixels: np.ndarray) -> np.ndarray:
-        """Pixels [N, 2] -> unit directions in the world [N, 3] from `centre`."""
+        """Return unit directions in the world [N, 3] from `centre` through pixels [N, 2]."""
         plane = np.asarray(self.camera.cam_from_img(np.asarray(pixels, np.float64)))
         directions = np.concatenate([plane, np.ones((len(plane), 1))], 1) @ self.rotation
         return directions / lengths(directions)[:, None]
 
 
 def lengths(vectors: np.ndarray) -> np.ndarray:
-    """[..., 2 or 3] -> [...]. np.linalg.norm to the last bit, in a third of its time: its sum over so short an axis is
-    slow."""
+    """Return the lengths of vectors [..., 2 or 3]: np.linalg.norm to the last bit, in a third of its time."""
     return np.sqrt(sum((vectors[..., k] ** 2 for k in range(1, vectors.shape[-1])), vectors[..., 0] ** 2))
 
 
 def read_points(capture: Capture) -> tuple[np.ndarray, np.ndarray]:
-    """The points [N, 3] in metres that were matched between the frames, and unit mean directions [N, 3] to the cameras
-    that saw them. Raises Problem."""
+    """Return matched points [N, 3] in metres, and unit mean directions [N, 3] to the cameras that saw them.
+
+    Raises Problem as `read_views` does.
+    """
     model = _read_model(capture)
     centres = {
         number: np.asarray(image.projection_center()) for number, image in model.images.items() if image.has_pose
@@ -89,26 +92,20 @@ def read_points(capture: Capture) -> tuple[np.ndarray, np.ndarray]:
     places = np.array([point.xyz for point in model.points3D.values()]).reshape(-1, 3)
     towards = np.zeros_like(places)
     for i, point in enumerate(model.points3D.values()):
-        seen = (
-            np.array(
-                [centres[element.image_id] for element in point.track.elements if element.image_id in centres]
-            ).reshape(-1, 3)
-            - places[i]
-        )
-        towards[i] = (seen / np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-9)).sum(0)
+        cameras = [centres[element.image_id] for element in point.track.elements if element.image_id in centres]
+        rays = np.array(cameras).reshape(-1, 3) - places[i]
+        towards[i] = (rays / np.maximum(np.linalg.norm(rays, axis=1, keepdims=True), 1e-9)).sum(0)
     return places, towards / np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
 
 
 def read_views(capture: Capture, selected_only: bool = False) -> list[View]:
-    """The registered frames in frame order. Raises Problem where the frames or the cameras are missing or damaged."""
+    """Return the registered frames in order. Raises Problem if frames or cameras are missing or damaged."""
     frames = read_frames(capture).by_name
     model = _read_model(capture)
     views = []
     for image in sorted(model.images.values(), key=lambda image: image.name):
         frame = frames.get(image.name)
-        if frame is None or (selected_only and not frame.selected):
-            continue
-        if not image.has_pose:
+        if frame is None or (selected_only and not frame.selected) or not image.has_pose:
             continue
         pose = pose_of(image)
         views.append(

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A picture painted elsewhere becomes the capture's shadow mask: any size and bit depth, white is shadow, soft edges
-stay."""
+"""Import of a mask painted in another program: any size and bit depth, white is shadow, soft edges are kept."""
 
 from __future__ import annotations
 
@@ -14,28 +13,25 @@ from ..settings.settings import Settings
 from . import images
 
 MOST_STRETCH_RATIO = 1.02
-"""How much more a mask may grow one way than the other: a pixel lost to rounding at 64 texels, not a picture of another
-shape."""
+"""Tolerated difference between the two scales: a pixel of rounding at 64 texels."""
 
 
 def import_mask(capture: Capture, picture: Path) -> Path:
-    """Writes shadow_mask.png (8 bit grey, at the texture's size) from `picture`; the mask before it goes to
-    mask_history/.
+    """Write shadow_mask.png (8 bit grey, at the texture's size) from a picture, and return its path.
 
-    Returns the mask's path. Raises Problem for what is no picture, one of another shape than the texture's, or no
-    capture, or when the folder cannot be written.
+    The previous mask goes to mask_history/. Raises Problem if there is no capture or picture, or if the picture's shape
+    differs from the texture's.
     """
     if not capture.json.is_file():
         raise Problem(f"There is no capture at {capture.root}.", "Choose a folder that ends in .wildcap.")
     if not Path(picture).is_file():
-        raise Problem(f"There is no picture at {picture}.", "Check its name.")
+        raise Problem(f"There is no picture at {picture}.", "Check the path.")
     mask = images.read_mask(picture)
-    width, height = _texture_size(capture)
+    width, height = images.size(capture.texture_png) if capture.texture_png.is_file() else [Settings().texture.size] * 2
     across, down = mask.shape[1] / width, mask.shape[0] / height
     if max(across, down) > MOST_STRETCH_RATIO * min(across, down):
         raise Problem(
-            f"{picture} is {mask.shape[1]} x {mask.shape[0]}, but the texture is {width} x {height}: it "
-            "would be stretched.",
+            f"{picture} is {mask.shape[1]} x {mask.shape[0]}, but the texture is {width} x {height}.",
             "Paint the mask on the capture's texture.png, without cropping it.",
         )
     if mask.shape != (height, width):
@@ -43,9 +39,3 @@ def import_mask(capture: Capture, picture: Path) -> Path:
     mask_history.keep(capture, capture.shadow_mask)
     images.write_data(capture.shadow_mask, mask.clip(0, 1))
     return capture.shadow_mask
-
-
-def _texture_size(capture: Capture) -> tuple[int, int]:
-    if not capture.texture_png.is_file():
-        return Settings().texture.size, Settings().texture.size
-    return images.size(capture.texture_png)

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of the sky each point of a head sees past the head itself: precomputed radiance transfer (Sloan, Kautz and
-Snyder 2002) in second-order spherical harmonics, and ambient occlusion, which is its part under an even sky.
+"""The sky's light that reaches each point of a head past the head itself.
+
+Precomputed radiance transfer (Sloan, Kautz and Snyder 2002) in second-order spherical harmonics, and ambient occlusion,
+its part under an even sky.
 """
 
 from __future__ import annotations
@@ -15,8 +17,7 @@ from .spherical_harmonics import UNIFORM, sh_basis
 
 
 def ambient_occlusion(transfer: np.ndarray) -> np.ndarray:
-    """radiance_transfer [..., 9] -> [...] in [0, 1]: the share of an even sky's light that reaches the surface; 1 where
-    nothing is in the way."""
+    """Return the share [...] in [0, 1] of an even sky's light that reaches the surface; 1: nothing in the way."""
     return np.clip(UNIFORM * transfer[..., 0], 0, 1)
 
 
@@ -27,20 +28,10 @@ def radiance_transfer(
     rays: int = 128,
     step: Callable[[int, int], None] = lambda done, of: None,
 ) -> np.ndarray:
-    """Irradiance / pi at surface points from the radiance of each orthonormal harmonic (spherical_harmonics.py),
-    occluded by the mesh.
+    """Return irradiance / pi at surface points per unit of each orthonormal harmonic of radiance, [N, 9].
 
-    Parameters
-    ----------
-    caster : of the mesh
-    points : [N, 3] on it, in metres
-    normals : [N, 3], unit
-    rays : directions that are cast
-    step : hears (done, of)
-
-    Returns
-    -------
-    [N, 9].
+    points [N, 3] in metres on the caster's mesh, which occludes them; normals unit; `rays` directions are cast; `step`
+    hears (done, of).
     """
     transfer = np.zeros((len(points), 9))
     directions = fibonacci_sphere(rays)
@@ -58,7 +49,7 @@ def radiance_transfer(
 
 
 def fibonacci_sphere(count: int) -> np.ndarray:
-    """Evenly spread unit directions [count, 3]."""
+    """Return evenly spread unit directions [count, 3]."""
     i = np.arange(count) + 0.5
     z, angle = 1 - 2 * i / count, np.pi * (1 + 5**0.5) * i
     r = np.sqrt(1 - z * z)

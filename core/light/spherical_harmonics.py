@@ -1,12 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Real spherical harmonics to the second order: the one place where their polynomials are written, for numpy arrays and
-torch tensors.
+"""Real spherical harmonics to the second order, for numpy arrays and torch tensors; their polynomials stand here only.
 
 Order (l, m): (0, 0), (1, -1), (1, 0), (1, 1), (2, -2), (2, -1), (2, 0), (2, 1), (2, 2), that is 1, y, z, x, xy, yz, 3
-z^2 - 1, xz, x^2 - y^2. Signs with the Condon-Shortley phase: the functions of odd m are negative where their polynomial
-is positive, as in the code of the method's authors. A function is its band's factor times a polynomial whose norm is
-the band's own; `bands` chooses the factors, of which the orthonormal ones are exact.
+z^2 - 1, xz, x^2 - y^2. Signs with the Condon-Shortley phase: functions of odd m are negative where their polynomial is
+positive, as in the code of the method's authors. A function is a factor of its band times a polynomial; `bands` chooses
+the factors.
 """
 
 from __future__ import annotations
@@ -20,10 +19,9 @@ Array = TypeVar("Array")  # numpy.ndarray or torch.Tensor
 Bands = tuple[float, float, float]
 
 ORTHONORMAL: Bands = (sqrt(1 / (4 * pi)), sqrt(3 / (4 * pi)), sqrt(15 / (4 * pi)))
-"""Factors of the bands 0, 1 and 2 under which the integral over the sphere of a product of two functions is 1 or 0."""
+"""Factors of the bands 0, 1 and 2 that make the functions orthonormal on the sphere."""
 LAMBERT: Bands = (1.0, 2 / 3, 1 / 4)
-"""What a Lambertian surface makes of each band of the radiance around it: irradiance over pi (Ramamoorthi and Hanrahan
-2001, where it is A_l over pi)."""
+"""Irradiance over pi of a Lambertian surface per band of radiance (Ramamoorthi and Hanrahan 2001: A_l over pi)."""
 GAMMA_BANDS: Bands = tuple(
     y * pi * lambert * scale
     for y, lambert, scale in zip(ORTHONORMAL, LAMBERT, (1.0, sqrt(3), 2 * sqrt(2)), strict=True)
@@ -35,8 +33,7 @@ UNIFORM = 1 / ORTHONORMAL[0]
 
 
 def sh_basis(directions: Array, bands: Bands = ORTHONORMAL, axis: int = -1) -> Array:
-    """The nine functions in unit directions whose x, y and z lie along `axis`, where the result has the functions:
-    [..., 3] -> [..., 9], say.
+    """Return the nine functions in unit directions whose x, y and z lie along `axis`: [..., 3] -> [..., 9].
 
     Lengths other than one enter the polynomials as they are. The kind of array and its precision stay.
     """
@@ -45,19 +42,18 @@ def sh_basis(directions: Array, bands: Bands = ORTHONORMAL, axis: int = -1) -> A
     harmonics = [b0 * one, *(b1 * p for p in first), *(b2 * p for p in (xy, yz, zz / (2 * 3**0.5), xz, xx_yy / 2))]
     if isinstance(directions, np.ndarray):
         return np.stack(harmonics, axis)
-    import torch  # who has a tensor has it loaded: for arrays numpy is enough
+    import torch  # loaded already by callers with tensors; arrays need numpy alone
 
     return torch.stack(harmonics, axis)
 
 
 def sh_polynomials(directions: Array, axis: int = -1) -> list[Array]:
-    """What the nine functions are multiples of, each without the dimension `axis`: 1, -y, z, -x, xy, -yz, 3 z^2 - 1,
-    -xz, x^2 - y^2."""
+    """Return the polynomials of the nine functions, with signs, each without the dimension `axis`."""
     x, y, z = np.moveaxis(directions, axis, 0) if isinstance(directions, np.ndarray) else directions.movedim(axis, 0)
     return [x**0, -y, z, -x, x * y, -y * z, 3 * z * z - 1, -x * z, x * x - y * y]
 
 
 def per_function(bands: Bands) -> tuple[float, ...]:
-    """A value for each band -> the same for each of the nine functions."""
+    """Repeat one value for each band for each of its functions."""
     first, second, third = bands
     return (first, *[second] * 3, *[third] * 5)

@@ -5,7 +5,7 @@
 import pytest
 
 from research.benchmarks import figures
-from research.benchmarks.delighting import shadow_mask, skin_tone
+from research.benchmarks.delighting import skin_tone
 
 
 def test_tones_are_summed_up_by_group():
@@ -24,10 +24,3 @@ def test_tones_are_summed_up_by_group():
         and found["dark"]["scene"]["within_two"] == 0
     )
     assert set(found["all"]["scene"]) == set(figures.read_record("skin_tone")["figures"]["groups"]["all"]["scene"])
-
-
-def test_a_masks_row_has_the_columns_of_its_table():
-    found = shadow_mask._figures("sample", "shading", (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 5.0))
-    assert found["border_f"] == 0.6 and set(
-        figures.read_record("shadow_mask")["figures"]["rows"]["synthetic 200, none"]
-    ) <= set(found)

@@ -98,46 +98,6 @@ def test_without_a_highlight_none_is_found(dark_room):
     assert np.median(found.strength[24:40, 24:40]) < 0.1 * F0
 
 
-def test_the_table_says_the_gap_and_leaves_out_what_was_not_measured():
-    def row(psnr, **more):
-        return {
-            "psnr": psnr - 1,
-            "psnr_after_gain": psnr,
-            "ssim_after_gain": 0.9,
-            "flip_after_gain": 0.1,
-            "detail": 0.8,
-            "mole_contrast": None,
-            **more,
-        }
-
-    textures = {"wild_texture": row(29.0), "flash_texture": row(33.0)}
-    people = {
-        "tan": {"wild": row(30.0), "flash": row(33.5), "limit": row(40.0), **textures},
-        "dark": {
-            "wild": row(32.0),
-            "flash": row(34.5),
-            "limit": row(42.0),
-            **textures,
-            "studio_texture": row(31.0),
-            "studio": row(31.5, seconds=80.0, proposed_mask_percent=0.4),
-        },
-        "light": {"wild": row(10.0)},
-    }
-    mean = controlled.means(people)
-    assert (
-        mean["flash"]["psnr_after_gain"] == 34
-        and mean["studio"]["psnr_after_gain"] == 31.5
-        and "mole_contrast" not in mean["wild"]
-    )
-    text = controlled.table({"people": people, "mean": mean})
-    assert (
-        "| tan | 30.00 | 33.50 | 40.00 | +3.50 | - | - | - |" in text
-        and "| mean | 31.00 | 34.00 | 41.00 | +3.00 |" in text
-    )
-    assert "mean of 2 people" in text and "mean of 1 people" in text and "light" not in text
-    assert "| dark | 31.00 | 31.50 | +0.50 | 0.80 | 0.80 | 0.40 | 80 |" in text and "| tan | 31" not in text
-
-
 def test_people_of_a_record_stay_where_others_are_measured(tmp_path, monkeypatch, capsys):
     def row(psnr):
         return {

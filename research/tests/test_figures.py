@@ -45,8 +45,3 @@ def test_a_file_that_is_no_record_is_a_problem(tmp_path, text):
         (tmp_path / "one.json").write_text(text, encoding="utf-8")
     with pytest.raises(Problem):
         figures.read_record("one", tmp_path)
-
-
-def test_a_table_has_a_dash_where_nothing_was_measured():
-    table = figures.markdown(["row", "PSNR"], [["ours", "30.1 dB"], ["theirs", None]])
-    assert table == "| row | PSNR |\n| --- | --- |\n| ours | 30.1 dB |\n| theirs | - |"

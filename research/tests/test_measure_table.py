@@ -58,10 +58,6 @@ def test_sure_differences_are_marked_though_people_differ_by_more():
     assert "| old | *-1.00 ± 0.04* | +0.100 | - |" in turned
 
 
-def test_nothing_has_no_sign():
-    assert "| old | 0.00 |" in format_table(summarise({"old": {"a": {"psnr": -0.001}}}, COLUMNS), COLUMNS, "method")
-
-
 def test_a_record_holds_the_people_behind_the_cells(tmp_path):
     figures.write_record(
         tmp_path / "table.json", "state", "command", to_record(summarise(SCORES, COLUMNS, "old"), SCORES)

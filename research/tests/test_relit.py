@@ -18,7 +18,7 @@ from research.benchmarks.captures import people, people_lights
 from research.benchmarks.delighting.delight_measures import TONES, tone_group  # noqa: E402
 from research.benchmarks.light import relit  # noqa: E402
 from research.benchmarks.light.relit_maps import Worn, make_rows, read_worn, worn_by, write_row  # noqa: E402
-from research.benchmarks.pictures import gallery, sheet
+from research.benchmarks.pictures import gallery
 from research.people import pigment  # noqa: E402
 from research.people.identities import reserved_seeds  # noqa: E402
 from research.people.parameters import sample_parameters  # noqa: E402
@@ -191,15 +191,6 @@ def test_a_render_is_made_again_once_a_map_is_newer(tmp_path):
     assert relit.is_newer(picture, capture, truth)
 
 
-def test_the_table_gives_the_mean_over_people_and_leaves_the_sample_out():
-    def rows(psnr):
-        return {row: {"psnr": psnr, "ssim": 0.5, "flip": 0.1} for row in relit.ROWS}
-
-    lines = relit.table({"sample": rows(90.0), "dark": rows(20.0), "light": rows(30.0)}).splitlines()
-    assert lines[0] == "| row | sample | dark | light | mean of 2 |" and len(lines) == 2 + len(relit.ROWS)
-    assert "| 25.00 dB, 0.500, 0.100 |" in lines[2]
-
-
 def test_only_the_rectangle_about_the_face_is_shown():
     face = np.zeros((200, 300), bool)
     face[50:100, 120:160] = True
@@ -217,13 +208,3 @@ def test_the_gallerys_close_up_lies_on_the_right_cheek():
     # 423: the other side
     assert side / 4 < abs(column - nose[0]) < 2 * side
     assert column != pytest.approx(gallery.landmark_uv(423)[0], abs=side / 2)
-
-
-def test_a_gallery_row_is_two_lines_and_small_enough(tmp_path):
-    noise = np.random.default_rng(0).random((gallery.TILE, gallery.TILE, 3), np.float32)
-    row = gallery.sheet([noise] * 14)
-    assert row.shape == (2 * gallery.TILE, 7 * gallery.TILE, 3)
-    np.testing.assert_array_equal(row[gallery.TILE :, -gallery.TILE :], noise)
-    sheet.write_small(tmp_path / "plain.jpg", gallery.sheet([np.full((8, 8, 3), 0.5, np.float32)] * 13))
-    assert (tmp_path / "plain.jpg").stat().st_size < sheet.MOST_BYTES
-    assert not gallery.sheet([noise] * 13)[gallery.TILE :, -gallery.TILE :].any()  # what is missing is black

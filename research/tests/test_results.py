@@ -41,10 +41,3 @@ def test_the_true_iris_has_the_hue_that_was_painted():
     colour = np.array([0.05, 0.024, 0.010])
     true = open_eyes.true_iris({"iris": colour.tolist(), "seed": 4}, 0.0155) - 0.002
     assert np.allclose(true / true[0], colour / colour[0], rtol=0.01) and true[0] == pytest.approx(0.05, rel=0.4)
-
-
-def test_figures_are_attributes_and_a_missing_one_is_named():
-    found = figures.Figures.of({"rows": {"a b": {"psnr": 1.5}}})
-    assert found.rows["a b"].psnr == 1.5
-    with pytest.raises(AttributeError, match="'ssim' among psnr"):
-        found.rows["a b"].ssim  # noqa: B018 a look-up is what is tried

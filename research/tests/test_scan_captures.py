@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The head scan's captures: they refuse clearly without the scan, and where it is, the scan lies as the people do."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,17 +14,6 @@ from research.benchmarks.captures import scan_captures  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT.parent / "shared" / "data"
-
-
-def test_without_the_scan_it_says_what_is_missing(tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-m", "research.benchmarks.captures.scan_captures", str(tmp_path), str(tmp_path / "out")],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 1 and "Traceback" not in done.stderr
-    assert "holds no head scan" in done.stderr and "LeePerrySmith.glb" in done.stderr
 
 
 def test_the_scan_faces_forward_about_the_origin():

@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from core.stages.solve.head_cells import place_cells
-from research.benchmarks import figures
-from research.benchmarks.maps import split, traits
-from research.benchmarks.measures.table import summarise, to_record
+from research.benchmarks.maps import traits
 from research.training.traits import LargeShapes, deviations_at
 
 
@@ -23,24 +21,6 @@ def test_the_correlation_of_a_known_field_falls_as_it_was_made():
     for name, value in found.items():
         low, high = (float(word) for word in name.removesuffix(" mm").split(" to "))
         assert np.exp(-high / 20) - 0.05 < value < np.exp(-low / 20) + 0.05, name
-
-
-def test_a_record_holds_plain_figures_and_the_tables_their_numbers():
-    scores = {
-        method: {"somebody": dict.fromkeys(split.COLUMNS, value)}
-        for method, value in ((split.DELIT, 20.0), (split.SOLVED, 21.5))
-    }
-    scales = {"somebody": {"traits": 0.1, "light": 0.2, "local": 0.3, "noise": 0.4}}
-    captures = {"somebody": {split.DELIT: 20.0, split.SOLVED: 21.5}}
-    record = {
-        **to_record(summarise(scores, split.COLUMNS, split.DELIT), scores),
-        "captures": captures,
-        "scales": scales,
-    }
-    assert figures.plain(record)["captures"]["somebody"][split.SOLVED] == pytest.approx(21.5)
-    assert "+1.50" in split.capture_table(
-        captures
-    ) and "| somebody | 0.100 | 0.200 | 0.300 | 0.400 |" in split.scale_table(scales)
 
 
 def laid_in(seed: int, count: int = 40) -> LargeShapes:

@@ -266,22 +266,6 @@ def test_a_capture_that_cannot_be_solved_is_named_and_the_others_go_on(tmp_path,
     assert capsys.readouterr().err == "anna: There is no head.\n"
 
 
-def test_the_page_says_what_the_solve_adds():
-    row = {"psnr": 30.0, "psnr_shared": 31.0}
-    text = state.by_capture_table(
-        {"anna": {DELIT: row, SOLVED: {"psnr": 30.5, "psnr_shared": 30.75}}, "ben": {DELIT: row}}
-    )
-    assert "| anna | - | - | - | - | 30.00 | 30.50 | +0.50 | 31.00 | 30.75 | -0.25 |" in text
-    assert "| ben | - | - | - | - | 30.00 | - | - | 31.00 | - | - |" in text
-    scores = {DELIT: {"anna": row, "ben": row}, SOLVED: {"anna": {"psnr": 30.5}, "ben": {"psnr": 31.0}}}
-    page = dict(state.sections(scores, {"anna": {DELIT: row}}))
-    assert (
-        "2 people" in page[""]
-        and "| solved | **+0.75 ± 0.25** |" in page["In the picture"]
-        and "Features kept" not in page
-    )
-
-
 def test_what_the_truth_shows_before_the_neck_is_no_facial_skin_of_the_head():
     """A beard's strands before a neck: the head hits its neck there, which no picture may judge."""
     side = 128

@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From frames to cameras in the order of what it costs and gives: plain features, features that hold on skin, the
-face's landmarks; and on the head alone where it did not keep still. The first model that passes the gate is taken.
+"""Attempts to find the cameras, in order of cost: plain features, features for skin, the face's landmarks.
+
+Where the head did not keep still, only matches on the head are used. The first acceptable model is kept.
 """
 
 from __future__ import annotations
@@ -32,28 +33,29 @@ from .world import HeadFrame, find_head, head_of_one
 LEAST_PLACED_SHARE = 0.6
 LEAST_VIEWS = 3
 MOST_ERROR_PX = 2.0
-"""Cameras hold when this share of the frames, and so many, are placed, with this mean reprojection error at most."""
+"""Minimum share and number of registered frames, and maximum mean reprojection error, to accept a model."""
 MOST_LANDMARK_MISS_SHARE = 0.06
-"""Share of the face's width by which landmarks may miss in cameras found from them."""
+"""Maximum miss of the landmarks in cameras found from them, as a share of the face's width."""
 FEW_PHOTOGRAPHS = 12
-"""Up to this many photographs the face's landmarks are tried before the costly features."""
+"""Up to so many frames the face's landmarks are tried before the costly features for skin."""
 MOST_FACES = 24
-"""Frames in which the face is looked for where structure from motion has found the cameras."""
+"""Frames in which the face is detected if structure from motion finds the cameras."""
 FILM_AGAIN = (
-    "Film again: the person sits still, the camera moves slowly around the face at arm's length, and the "
-    "background is busy rather than a white "
-    "wall; or take a photograph every ten degrees around the face."
+    "Film again: let the person sit still, move the camera slowly around the face at arm's length, before a busy "
+    "background rather than a white wall; or take a photograph every ten degrees around the face."
 )
 
 
 @dataclass(frozen=True)
 class Solved:
-    """A model in a world of its own; how it was found: plain, skin or face; the head in it; the faces it was found by;
-    whether the head moved before its background, and whether the camera stood still then; mirrored frames that were
-    left out; tracks that refined a model from the face, and whether they are enough to trust it; the matches it comes
-    from, where more is to be made of them; whether after that every frame is held by what matches; swayed: the share of
-    the error of the head's matches that went when the room had no say; to_place: the frames that were to be placed,
-    where those are not all."""
+    """A model in a world of its own, and what is known of it.
+
+    way: plain, skin or face; head, face_by_name: the head in it, by these faces; head_moved: before its background;
+    stood_still: the camera did, while the head turned; mirrored: frames left out; tracks, refined: how many refined a
+    model from the face, and whether they are enough to trust it; matches: those it comes from; every_frame_held: every
+    frame has enough matches; swayed: share of the head's matching error removed by cameras of its own; to_place: the
+    frames to be placed, if not all.
+    """
 
     model: pycolmap.Reconstruction
     way: str
@@ -71,35 +73,50 @@ class Solved:
 
 
 def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
-    """The cameras of a capture.
-
-    Parameters
-    ----------
-    frames : of the capture
-    capture : that holds them
-    settings : of the cameras
-    report : hears of progress, takes the findings
-
-    Raises
-    ------
-    Problem
-        With what is wrong, as precisely as can be told.
-    """
+    """Find the cameras of a capture. Raises Problem with the most precise reason if no attempt is accepted."""
     records = frames.records
     few = len(records) <= FEW_PHOTOGRAPHS
     face_by_name = find_landmarks(records if few else _spread(records), capture.frames, report)
-    if frames.kind == VIDEO and not few and surroundings_stay(face_by_name, capture.frames):
-        to_place = spread_over(records)
-        report.log(
-            f"All but the head stays where it is: the camera stood still. Only the head's own matches count, in "
-            f"{len(to_place)} of {len(records)} frames."
-        )
-        face_by_name = find_landmarks(_spread(to_place), capture.frames, report)
-        return replace(
-            _solve(Frames(to_place, frames.kind), face_by_name, capture, settings, report, stood=True),
-            to_place=to_place,
-        )
-    return _solve(frames, face_by_name, capture, settings, report)
+    if frames.kind != VIDEO or few or not surroundings_stay(face_by_name, capture.frames):
+        return _solve(frames, face_by_name, capture, settings, report)
+    to_place = spread_over(records)
+    report.log(
+        f"Everything but the head stays in place: the camera stood still. Only matches on the head are used, in "
+        f"{len(to_place)} of {len(records)} frames."
+    )
+    face_by_name = find_landmarks(_spread(to_place), capture.frames, report)
+    solved = _solve(Frames(to_place, frames.kind), face_by_name, capture, settings, report, stood=True)
+    return replace(solved, to_place=to_place)
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A way to find cameras (plain or skin features, or the face) and what is required to accept its model.
+
+    refined: matches must have refined it; complete: all frames must be placed, except mirrored ones.
+    """
+
+    way: str
+    refined: bool = False
+    complete: bool = False
+
+
+FEW_FRAMES_ATTEMPTS = (
+    Attempt("plain", complete=True),
+    Attempt("face", refined=True, complete=True),
+    Attempt("skin", complete=True),
+    Attempt("face"),
+)
+MANY_FRAMES_ATTEMPTS = (Attempt("plain"), Attempt("skin"), Attempt("face"))
+
+
+def _attempts(count: int, features: str) -> tuple[Attempt, ...]:
+    """Return the attempts for so many frames in order; the last one is accepted as it is."""
+    if count < LEAST_VIEWS:  # a draft
+        return (Attempt("face"),)
+    if features != "auto":
+        return (Attempt(features),)
+    return FEW_FRAMES_ATTEMPTS if count <= FEW_PHOTOGRAPHS else MANY_FRAMES_ATTEMPTS
 
 
 def _solve(
@@ -110,99 +127,120 @@ def _solve(
     report: Reporter,
     stood: bool = False,
 ) -> Solved:
-    """`solve` with these frames alone and the faces in some of them; `stood`: it is known that the camera stood still
-    while the head turned."""
-    records = frames.records
-    few = len(records) <= FEW_PHOTOGRAPHS
-    usual = ("plain", "face", "skin", "face") if few else ("plain", "skin", "face")
-    ways = usual if settings.cameras.features == "auto" else (settings.cameras.features,)
-    if len(records) < LEAST_VIEWS:  # a draft
-        ways = ("face",)
-    matches, faults, moved, partial = Matches(), [], stood, None
-    for turn, way in enumerate(ways):
-        if way == "face":
-            if len(face_by_name) < len(records) <= 5 * MOST_FACES and not few:
-                face_by_name = find_landmarks(records, capture.frames, report)
-            solved, fault = _by_face(records, capture, face_by_name, matches, settings, report)
-            if solved and few and not solved.refined and "skin" in ways[turn:]:
-                report.log(
-                    "The face gives cameras, but too little else matches to refine them; features that hold on "
-                    "skin are tried."
-                )
-                continue
+    """Try the attempts in order until one is accepted; `stood`: the camera is known to have stood still."""
+    search = _Search(frames, face_by_name, capture, settings, report, stood_still=stood, head_moved=stood)
+    faults = []
+    for attempt in _attempts(len(frames.records), settings.cameras.features):
+        solved, fault = search.by_face() if attempt.way == "face" else search.by_features(attempt.way == "skin")
+        if fault:
+            faults.append(fault)
+            report.log(f"By {attempt.way} features: {fault}" if attempt.way != "face" else f"By the face: {fault}")
+        elif attempt.refined and not solved.refined:
+            report.log("The face gives cameras, but too few matches to refine them; features for skin are tried next.")
         else:
-            skin, alone = way == "skin", stood
-            solved, matches, fault = _by_features(skin, frames, capture, face_by_name, settings, report, alone)
-            stood = stood or bool(camera_stood_still(matches, face_by_name))
-            if not alone and (stood or (fault and solved)):  # what matches is not one motion: the head's alone
-                moved = True
-                solved, matches, fault = _by_features(skin, frames, capture, face_by_name, settings, report, alone=True)
-        if solved and not fault:
-            if partial and worth(partial) > worth(solved):
-                solved, matches = partial, partial.matches
-            rest = sorted(
-                {record.name for record in records}
-                - {image.name for image in solved.model.images.values() if image.has_pose}
-            )
-            mirrored = (
-                tuple(_mirrored(frames, rest, solved.model, face_by_name, capture, report) if way != "face" else ())
-                or solved.mirrored
-            )
-            solved = replace(solved, head_moved=moved, stood_still=stood, mirrored=mirrored)
-            partial = replace(solved, matches=matches)
-            if few and len(rest) > len(mirrored) and ways[turn + 1 :]:
-                report.log(f"{len(rest)} of {len(records)} frames do not fit the others yet; another way is tried.")
-                continue
-            break
-        faults.append(fault)
-        report.log(f"By {way} features: {fault}" if way != "face" else f"By the face: {fault}")
-    if partial:
-        return _refined(partial, frames, capture, settings, report)
-    raise _explained(frames, faults, face_by_name, moved, stood, capture, report)
+            unplaced = search.keep(solved, attempt.way)
+            if not (attempt.complete and unplaced):
+                break
+            report.log(f"{unplaced} of {len(frames.records)} frames are not placed yet; another way is tried.")
+    if search.best:
+        return _refined(search.best, frames, capture, settings, report)
+    raise _explained(frames, faults, search.face_by_name, search.head_moved, search.stood_still, capture, report)
+
+
+@dataclass
+class _Search:
+    """The state shared by the attempts: what is known of the capture, the last matches, and the best model so far."""
+
+    frames: Frames
+    face_by_name: dict[str, faces.Face]
+    capture: Capture
+    settings: Settings
+    report: Reporter
+    stood_still: bool
+    head_moved: bool
+    matches: Matches = field(default_factory=Matches)
+    best: Solved | None = None
+
+    def by_face(self) -> tuple[Solved | None, str | None]:
+        """Return a model from the face's landmarks and the last matches, or its fault."""
+        records = self.frames.records
+        if len(self.face_by_name) < len(records) <= 5 * MOST_FACES and len(records) > FEW_PHOTOGRAPHS:
+            self.face_by_name = find_landmarks(records, self.capture.frames, self.report)
+        return _by_face(records, self.capture, self.face_by_name, self.matches, self.settings, self.report)
+
+    def by_features(self, skin: bool) -> tuple[Solved | None, str | None]:
+        """Return a model from features, on the head alone if it moved before its background, or its fault."""
+        given = skin, self.frames, self.capture, self.face_by_name, self.settings, self.report
+        head_alone = self.stood_still
+        solved, self.matches, fault = _by_features(*given, head_alone)
+        self.stood_still = self.stood_still or bool(camera_stood_still(self.matches, self.face_by_name))
+        if not head_alone and (self.stood_still or (fault and solved)):  # several motions match: use the head's alone
+            self.head_moved = True
+            solved, self.matches, fault = _by_features(*given, alone=True)
+        return solved, fault
+
+    def keep(self, solved: Solved, way: str) -> int:
+        """Keep a model unless an earlier one is better; return how many frames lack a camera and are not mirrored."""
+        if self.best and worth(self.best) > worth(solved):
+            solved, self.matches = self.best, self.best.matches
+        placed = {image.name for image in solved.model.images.values() if image.has_pose}
+        rest = sorted({record.name for record in self.frames.records} - placed)
+        mirrored = solved.mirrored
+        if way != "face":
+            found = _mirrored(self.frames, rest, solved.model, self.face_by_name, self.capture, self.report)
+            mirrored = tuple(found) or mirrored
+        self.best = replace(
+            solved,
+            head_moved=self.head_moved,
+            stood_still=self.stood_still,
+            mirrored=mirrored,
+            matches=self.matches,
+        )
+        return len(rest) - len(mirrored)
 
 
 def worth(solved: Solved) -> tuple[bool, int, bool]:
-    """Which of two ways found better cameras: those that something else than the face bears out first, then the more,
-    then those by features."""
+    """Sort key of models: supported by more than the face, then the number of cameras, then found by features."""
     return solved.way != "face" or solved.refined, solved.model.num_reg_images(), solved.way != "face"
 
 
 def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
-    """A film with its cameras placed with respect to the head, if that swayed; photographs that lie far apart with
-    their cameras adjusted together with the face, and those that only then find a place."""
-    apart = settings.cameras.interpupillary_mm / 1000
+    """Refine a film's cameras if the head swayed, and photographs' cameras together with the face.
+
+    Photographs that only then match are placed as well.
+    """
     if frames.kind == VIDEO and solved.way != "face" and not solved.head_moved:
-        film = film_of(frames.records)
-        model, left = settle(
-            solved.model, solved.head, solved.matches, report, skeleton.choose(film, skeleton.size(film))
-        )
-        if left is None or model is not solved.model:  # a room's features are too coarse for a head
-            boxes = head_boxes(solved.model, solved.head)
-            if boxes:
-                fine, chosen = match_crops(boxes, frames, capture, settings.seed, report)
-                model, left = settle(solved.model, solved.head, fine, report, chosen)
-        if model is solved.model:
-            return solved
-        report.log(
-            f"The head swayed before its surroundings: what matches on it misses by {100 * (1 - left):.0f} % "
-            "less on its own; its cameras are taken."
-        )
-        return replace(solved, model=model, head=find_head(model, solved.face_by_name, apart), swayed=1 - left)
-    by_faces_alone = solved.way == "face" and not solved.refined
-    if frames.kind != PHOTOGRAPHS or len(frames.records) > ALL_PAIRS_FRAMES or by_faces_alone:
+        return _settled(solved, frames, capture, settings, report)
+    by_face_alone = solved.way == "face" and not solved.refined
+    if frames.kind != PHOTOGRAPHS or len(frames.records) > ALL_PAIRS_FRAMES or by_face_alone:
         return solved
-    fits = {image.name for image in solved.model.images.values() if image.has_pose}
-    missing = [record for record in frames.records if record.name not in fits and record.name not in solved.mirrored]
+    placed = {image.name for image in solved.model.images.values() if image.has_pose}
+    missing = [record for record in frames.records if record.name not in placed and record.name not in solved.mirrored]
     told = {record.name: record.focal_px for record in frames.records if record.focal_px}
-    model = refine(
-        solved.model, solved.face_by_name, solved.matches, told, report, camera_groups(missing, capture.frames)
+    groups = camera_groups(missing, capture.frames)
+    model = refine(solved.model, solved.face_by_name, solved.matches, told, report, groups)
+    head = find_head(model, solved.face_by_name, settings.cameras.interpupillary_mm / 1000)
+    return replace(solved, model=model, head=head, every_frame_held=holds_every_frame(model))
+
+
+def _settled(solved: Solved, frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
+    """Place a film's cameras with respect to the head, if that swayed before its surroundings."""
+    film = film_of(frames.records)
+    carrying = skeleton.choose(film, skeleton.size(film))
+    model, left = settle(solved.model, solved.head, solved.matches, report, carrying)
+    if left is None or model is not solved.model:  # a room's features are too coarse for a head
+        boxes = head_boxes(solved.model, solved.head)
+        if boxes:
+            fine, chosen = match_crops(boxes, frames, capture, settings.seed, report)
+            model, left = settle(solved.model, solved.head, fine, report, chosen)
+    if model is solved.model:
+        return solved
+    report.log(
+        f"The head swayed before its surroundings: cameras of its own reduce the error of its matches by "
+        f"{100 * (1 - left):.0f} % and are used."
     )
-    return replace(
-        solved,
-        model=model,
-        head=find_head(model, solved.face_by_name, apart),
-        every_frame_held=holds_every_frame(model),
-    )
+    head = find_head(model, solved.face_by_name, settings.cameras.interpupillary_mm / 1000)
+    return replace(solved, model=model, head=head, swayed=1 - left)
 
 
 def _by_features(
@@ -214,15 +252,14 @@ def _by_features(
     report: Reporter,
     alone: bool = False,
 ) -> tuple[Solved | None, Matches, str | None]:
-    """The model of one kind of features, the matches, and its shortcoming; `alone`: on the head only. A model whose
-    head moved is given, with that fault."""
+    """Return the model of one kind of features, the matches, and its shortcoming; `alone`: on the head only.
+
+    A model whose head moved is returned together with that fault.
+    """
     with capture.workspace() as work:
         if alone:
-            face_by_name = (
-                face_by_name
-                if len(face_by_name) > len(frames.records) / 2
-                else find_landmarks(frames.records, capture.frames, report)
-            )
+            if len(face_by_name) <= len(frames.records) / 2:
+                face_by_name = find_landmarks(frames.records, capture.frames, report)
             head_masks(face_by_name, frames.records, capture.frames, work, report)
         model, matches = solve_structure(
             frames, capture, skin, settings.cameras.matching, settings.seed, report, work if alone else None
@@ -235,19 +272,19 @@ def _by_features(
     except Problem as problem:
         return None, matches, problem.problem
     solved = Solved(model, "skin" if skin else "plain", head, face_by_name)
-    return solved, matches, None if head.still else "The face is not still with respect to its surroundings."
+    return solved, matches, None if head.still else "The face moves relative to its surroundings."
 
 
 def shortcoming(model: pycolmap.Reconstruction | None, frames: int) -> str | None:
-    """What keeps a model of structure from motion from the gate."""
+    """Return why a model of structure from motion is not acceptable, or None."""
     registered = model.num_reg_images() if model else 0
     if registered < LEAST_VIEWS:
-        return "The frames do not fit together: no common structure was found in three of them."
+        return "The frames do not fit together: no three of them show a common structure."
     if registered < LEAST_PLACED_SHARE * frames:
         return f"Only {registered} of {frames} frames fit together."
     error = model.compute_mean_reprojection_error()
     if error > MOST_ERROR_PX:
-        return f"The frames fit together only roughly ({error:.1f} px off on average)."
+        return f"The frames fit together only roughly (mean error {error:.1f} px)."
     return None
 
 
@@ -259,28 +296,24 @@ def _by_face(
     settings: Settings,
     report: Reporter,
 ) -> tuple[Solved | None, str | None]:
-    shown = {record.name: record.shown for record in records}
-    mirrored = (
-        find_mirrored(sorted(face_by_name), [], capture.frames, report, face_by_name)
-        if len(records) <= FEW_PHOTOGRAPHS
-        else []
-    )
-    result = resect(
-        camera_groups(records, capture.frames),
-        {name: face for name, face in face_by_name.items() if name not in mirrored},
-        matches,
-        report,
-    )
+    """Return a model from the face's landmarks and what matches, or its fault."""
+    mirrored = []
+    if len(records) <= FEW_PHOTOGRAPHS:
+        mirrored = find_mirrored(sorted(face_by_name), [], capture.frames, report, face_by_name)
+    upright = {name: face for name, face in face_by_name.items() if name not in mirrored}
+    result = resect(camera_groups(records, capture.frames), upright, matches, report)
     registered = result.model.num_reg_images() if result else 0
     if registered < min(LEAST_VIEWS, len(records)):
+        shown = {record.name: record.shown for record in records}
         but = f", and {', '.join(shown[name] for name in mirrored)} is mirrored" if mirrored else ""
-        without = f"A face is found in only {len(face_by_name)} of {len(records)} frames{but}"
-        return None, f"{without}; the landmarks of three could have placed the cameras."
+        return None, (
+            f"A face was found in only {len(face_by_name)} of {len(records)} frames{but}; "
+            "placing cameras by landmarks takes three."
+        )
     if result.landmark_miss > MOST_LANDMARK_MISS_SHARE:
-        return (
-            None,
-            f"The face does not look like one still face in these frames: its landmarks miss by "
-            f"{100 * result.landmark_miss:.0f} % of its width.",
+        return None, (
+            "The face does not look like one still face in these frames: its landmarks miss by "
+            f"{100 * result.landmark_miss:.0f} % of its width."
         )
     apart = settings.cameras.interpupillary_mm / 1000
     head = (
@@ -288,9 +321,8 @@ def _by_face(
         if registered > 1
         else head_of_one(result.coefficients, result.landmark_px, result.landmark_miss, apart)
     )
-    return Solved(
-        result.model, "face", head, face_by_name, mirrored=tuple(mirrored), tracks=result.tracks, refined=result.refined
-    ), None
+    found = {"mirrored": tuple(mirrored), "tracks": result.tracks, "refined": result.refined}
+    return Solved(result.model, "face", head, face_by_name, **found), None
 
 
 def _mirrored(
@@ -301,7 +333,7 @@ def _mirrored(
     capture: Capture,
     report: Reporter,
 ) -> list[str]:
-    """Among photographs that did not fit, those that are mirrored."""
+    """Return the mirrored ones among photographs that were not placed."""
     if not unplaced or frames.kind == VIDEO or len(unplaced) > 2 * FEW_PHOTOGRAPHS:
         return []
     trusted = sorted(image.name for image in model.images.values() if image.has_pose)
@@ -309,17 +341,16 @@ def _mirrored(
 
 
 def _spread(records: Sequence[FrameRecord]) -> list[FrameRecord]:
-    """At most MOST_FACES frames with a face, those that face the camera first, spread over the sequence."""
-    seen = [record for record in records if record.yaw_deg is not None]
-    frontal = [record for record in seen if abs(record.yaw_deg) < 45]
-    seen = frontal if len(frontal) >= 4 else seen
-    return spread_evenly(seen, MOST_FACES)
+    """Return at most MOST_FACES frames with a face, preferably frontal, spread over the sequence."""
+    with_face = [record for record in records if record.yaw_deg is not None]
+    frontal = [record for record in with_face if abs(record.yaw_deg) < 45]
+    return spread_evenly(frontal if len(frontal) >= 4 else with_face, MOST_FACES)
 
 
 def _explained(
     frames: Frames, faults: list[str], face_by_name: dict, moved: bool, stood: bool, capture: Capture, report: Reporter
 ) -> Problem:
-    """The Problem that fits best what was tried."""
+    """Return the Problem that best describes why every attempt failed."""
     records = frames.records
     names = {record.name: record.shown for record in records}
     mirrored = (
@@ -331,14 +362,13 @@ def _explained(
         they = "is mirrored: it fits" if len(mirrored) == 1 else "are mirrored: they fit"
         return Problem(
             f"{', '.join(names[name] for name in mirrored)} {they} the other pictures only when flipped left to right.",
-            "Flip them back, or leave them out; on a phone, switch off the mirroring of the front camera.",
+            "Flip them back or leave them out; on a phone, switch off mirroring of the front camera.",
         )
     if moved or stood:
         return Problem(
-            "The head turned in front of a camera that stood still, and the face alone does not give its motion."
+            "The head turned in front of a camera that stood still, and its motion cannot be found from the face alone."
             if stood
-            else "The face is not still with respect to its surroundings: the cameras follow the "
-            "background, and the head moved.",
-            "Let the person sit still, look at one point, and move the camera instead.",
+            else "The head moved: the cameras follow the background, and the face does not.",
+            "Let the person sit still and look at one point, and move the camera instead.",
         )
     return Problem(" ".join(dict.fromkeys([faults[0], faults[-1]])), FILM_AGAIN)

@@ -1,11 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stage frames: a video or a folder of photographs becomes frames/: sharp ones, in one exposure, with the turn of the
-head in each.
+"""Stage frames: sharp frames of one exposure from a video or a folder of photographs, with the head's turn in each.
 
-frames.json (capture/frame_records.py) tells of the written frames, to which the gains have been applied already: every
-stage, and any tool that is given the folder, sees one exposure. The mask of the person is not stored:
-faces.segment_person gives it in the time a file is read in.
+frames.json (capture/frame_records.py) describes the written frames, to which the gains have already been applied: every
+stage, and any tool that is given the folder, sees one exposure.
 """
 
 from __future__ import annotations
@@ -33,24 +31,25 @@ from .source import Picture
 from .video import read_video
 
 FEWEST_FRAMES = 3
-"""Of a video, frames that a head can be built from; of photographs one will do, for a draft."""
+"""Of a video; of photographs one is enough for a draft."""
 STILL_DIFFERENCE = 0.004
-"""Mean difference of two small frames, in [0, 1], below which the camera has not moved: above compression noise, far
-below a step aside."""
+"""Mean difference of two thumbnails in [0, 1] below which the camera did not move: above compression noise."""
 RIVAL_RATIO = 1.5
-"""A face this much more prominent than the one that was followed takes its place."""
+"""A face this much more prominent than the one followed takes its place."""
 READING_SHARE = 0.9
-"""Share of the stage's time that reading takes, for the progress."""
+"""Of the stage's time, for the progress."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Writes capture.frames. Raises Problem where a video has fewer than three readable frames, where there is no face,
-    or no motion."""
+    """Write capture.frames.
+
+    Raises Problem for a video with fewer than three readable frames, and if there is no face or no motion.
+    """
     path = capture.source
     if path is None or not (path.is_dir() or path.is_file()):
         raise Problem(
             f"There is no video or folder of photographs at {str(path)!r}." if path else "No video was chosen.",
-            "Choose a video of the face, or a folder of photographs.",
+            "Choose a video of the face or a folder of photographs.",
         )
     photographs = path.is_dir()
     read = read_photographs if photographs else read_video
@@ -73,8 +72,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
 
 def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[FrameRecord], np.ndarray, list, list[float]]:
-    """Consumes the pictures; their records, thumbnails [N, 32, 32], what the exposure is compared by, and how surely
-    the face wears glasses."""
+    """Write all pictures; return their records, thumbnails [N, 32, 32], contents and log odds of glasses."""
     records, thumbnails, contents, glasses, last = [], [], [], [], None
     for picture in pictures:
         name = f"{picture.index:05d}.jpg"
@@ -98,21 +96,24 @@ def _flipped(picture: np.ndarray | None) -> np.ndarray | None:
 
 
 def _subject(srgb: np.ndarray, last: faces.Face | None) -> tuple[faces.Face | None, float]:
-    """The face of the subject, the one followed so far unless another is far more prominent, and how prominent the next
-    is beside it."""
+    """Return the subject's face and the prominence of the next face relative to it.
+
+    The face followed so far is kept unless another one is far more prominent.
+    """
     face = faces.detect(srgb, last)
     if face is None:
         return None, 0.0
-    weighed = [(faces.prominence(each, srgb.shape[1], srgb.shape[0]), each) for each in faces.detect_others(srgb, face)]
-    if not weighed:
+    height, width = srgb.shape[:2]
+    others = [(faces.prominence(each, width, height), each) for each in faces.detect_others(srgb, face)]
+    if not others:
         return face, 0.0
-    weight = faces.prominence(face, srgb.shape[1], srgb.shape[0])
-    second, rival = max(weighed, key=lambda pair: pair[0])
-    return (rival, weight / second) if second > RIVAL_RATIO * weight else (face, second / weight)
+    own = faces.prominence(face, width, height)
+    second, rival = max(others, key=lambda pair: pair[0])
+    return (rival, own / second) if second > RIVAL_RATIO * own else (face, second / own)
 
 
 def _record(picture: Picture, name: str, face: faces.Face | None, last: faces.Face | None, rival: float) -> FrameRecord:
-    """`last` tells where the head is in a frame of a film, more or less, where no face is found."""
+    """Measure a picture; `last` is where the head roughly is in a film's frame without a face."""
     near = _box_of_head(picture, face, last)
     return FrameRecord(
         name=name,
@@ -133,8 +134,10 @@ def _record(picture: Picture, name: str, face: faces.Face | None, last: faces.Fa
 
 
 def _box_of_head(picture: Picture, face: faces.Face | None, last: faces.Face | None) -> tuple | None:
-    """Left, top, right and bottom of where a picture is measured: the face's box; in a film the last one's, in a
-    photograph the person's, where no face is found. None where there is none of these."""
+    """Left, top, right and bottom of the region to measure, or None.
+
+    The face's box; without a face the last one's in a film, the person's in a photograph.
+    """
     near = face or (last if picture.time_s is not None else None)
     if near or picture.time_s is not None:
         return near.box if near else None
@@ -145,7 +148,7 @@ def _box_of_head(picture: Picture, face: faces.Face | None, last: faces.Face | N
 def _drop_blurred(
     records: list[FrameRecord], contents: list, folder: Path
 ) -> tuple[list[FrameRecord], list, list[str]]:
-    """Without the frames that are blurred by comparison, whose files go too; and their names."""
+    """Remove frames that are blurred compared with their neighbours, files included; return also their names."""
     bad = blurred(records)
     dropped = [r.name for r, out in zip(records, bad, strict=True) if out]
     for name in dropped:
@@ -156,8 +159,10 @@ def _drop_blurred(
 
 
 def _even_out(records: list[FrameRecord], contents: list, folder: Path, report: Reporter) -> list[FrameRecord]:
-    """Brings all frames to the exposure and white balance of the median frame; those that have it stay byte for byte.
-    The records with their gains."""
+    """Bring all frames to the exposure and white balance of the median frame; return the records with their gains.
+
+    Frames that have it already keep their bytes.
+    """
     gains, evened = gains_of(contents, report.check), []
     for done, (record, gain) in enumerate(zip(records, gains, strict=True)):
         if np.abs(np.log(gain)).max() < 0.005:
@@ -173,8 +178,7 @@ def _even_out(records: list[FrameRecord], contents: list, folder: Path, report: 
 
 
 def _select(records: list[FrameRecord], count: int) -> list[FrameRecord]:
-    """The same records with the V views marked. A blink is none of them as long as there are other frames to choose
-    from."""
+    """Mark the V views. A blink is not chosen while there are other frames to choose from."""
     turn = turns(records)
     open_ = np.array([not r.blink for r in records])
     if (np.isfinite(turn) & open_).sum() >= min(count, FEWEST_FRAMES):
@@ -186,9 +190,8 @@ def _select(records: list[FrameRecord], count: int) -> list[FrameRecord]:
 def _check(path: Path, records: list[FrameRecord], thumbnails: np.ndarray, photographs: bool) -> None:
     if len(records) < FEWEST_FRAMES and not photographs:
         raise Problem(
-            f"Only {len(records)} frames of {path.name} could be read; three are the least a head can be built from.",
-            "Film the face for 5 to 30 seconds while you walk half around it; if the file may be damaged, "
-            "copy it again.",
+            f"Only {len(records)} frames of {path.name} could be read; a head needs at least three.",
+            "Film the face for 5 to 30 seconds, walking half around it. If the file may be damaged, copy it again.",
         )
     if not any(r.face_box for r in records):
         raise Problem("No face was found in any frame.", FIND_FACE)

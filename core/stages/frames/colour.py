@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A video's signal to the sRGB a phone would show: HLG and PQ (ITU-R BT.2100) on a display of 1000 nits, wide gamuts
-brought in.
+"""Video signals to the sRGB a phone would show: HLG and PQ (ITU-R BT.2100) on a display of 1000 nits, wide gamuts.
 
-Dolby Vision 8.4, as iPhones record it, is HLG with metadata beside it; it is read as its HLG. Reference white, 203 nits
-(BT.2408), is 1.0 of linear light before the tone curve, so an HDR video of a face gives the skin the tone an SDR one
-would.
+Dolby Vision 8.4, as iPhones record it, is HLG with metadata beside it and is read as HLG. Reference white, 203 nits
+(BT.2408), is 1.0 of linear light before the tone curve, so that an HDR video of a face gives the skin the tone an SDR
+one would.
 """
 
 from __future__ import annotations
@@ -15,14 +14,14 @@ import numpy as np
 from ...imaging import images
 
 SDR, HLG, PQ = 1, 18, 16
-"""Transfer characteristics as ITU-T H.273 numbers them; all that is neither HLG nor PQ is shown as it is."""
+"""Transfer characteristics by ITU-T H.273; everything but HLG and PQ is taken as SDR."""
 REC709, REC2020, P3 = 1, 9, 12
-"""Colour primaries, likewise; P3 is Display P3."""
+"""Colour primaries by ITU-T H.273; P3 is Display P3."""
 COMPACT_SRGB = ("c2", "c2ci")
-"""What small profiles of sRGB call themselves, as social networks write them."""
+"""Names of small sRGB profiles, as social networks write them."""
 WHITE_NITS, PEAK_NITS = 203.0, 1000.0
 KNEE_LINEAR = 0.8
-"""Linear light below which the tone curve changes nothing: all of a face but its highlights."""
+"""The tone curve changes nothing below: all of a face but its highlights."""
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of linear Rec. 709 (ITU-R BT.709)
 LUMINANCE_2020 = np.array([0.2627, 0.6780, 0.0593], np.float32)  # of linear Rec. 2020 (ITU-R BT.2020)
 TO_REC709 = {
@@ -41,8 +40,10 @@ ADOBE_TO_REC709 = np.array([[1.398356, -0.398356, 0.0], [0.0, 1.0, 0.0], [0.0, -
 
 
 def from_profile(signal: np.ndarray, profile: str) -> np.ndarray | None:
-    """A picture's values [..., 3] in [0, 1] as sRGB, by the name of its colour profile ('' is sRGB); None for a profile
-    that is not known."""
+    """Convert values [..., 3] in [0, 1] to sRGB by the name of their colour profile ('' is sRGB).
+
+    None for an unknown profile.
+    """
     name = profile.lower().replace(" ", "")
     if not name or "srgb" in name or name in COMPACT_SRGB:
         return signal
@@ -54,17 +55,14 @@ def from_profile(signal: np.ndarray, profile: str) -> np.ndarray | None:
 
 
 def to_srgb(signal: np.ndarray, transfer: int, primaries: int) -> np.ndarray:
-    """A full-range R'G'B' signal float32 [..., 3] in [0, 1] -> sRGB float32 in [0, 1]. Numbers of `transfer` and
-    `primaries` are H.273's.
+    """Convert a full-range R'G'B' signal float32 [..., 3] in [0, 1] to sRGB float32 in [0, 1].
 
-    HDR whose primaries are not told is Rec. 2020, as BT.2100 has it.
+    `transfer` and `primaries` are H.273's numbers. HDR with unstated primaries is Rec. 2020, as BT.2100 has it.
     """
     if transfer not in (HLG, PQ):
-        return (
-            signal
-            if primaries not in TO_REC709
-            else images.linear_to_srgb(into_gamut(images.srgb_to_linear(signal) @ TO_REC709[primaries].T))
-        )
+        if primaries not in TO_REC709:
+            return signal
+        return images.linear_to_srgb(into_gamut(images.srgb_to_linear(signal) @ TO_REC709[primaries].T))
     light = hlg_light(signal) if transfer == HLG else pq_light(signal)
     if primaries != REC709:
         light = light @ TO_REC709.get(primaries, TO_REC709[REC2020]).T
@@ -72,8 +70,7 @@ def to_srgb(signal: np.ndarray, transfer: int, primaries: int) -> np.ndarray:
 
 
 def hlg_light(signal: np.ndarray) -> np.ndarray:
-    """HLG signal -> display light, 1.0 at reference white: the inverse OETF, then the OOTF of gamma 1.2 on luminance
-    (BT.2100, table 5)."""
+    """Convert HLG to display light, 1.0 at reference white: inverse OETF, then the OOTF (BT.2100, table 5)."""
     a, b, c = 0.17883277, 0.28466892, 0.55991073
     scene = np.where(signal <= 0.5, signal**2 / 3, (np.exp((np.maximum(signal, 0.5) - c) / a) + b) / 12)
     luminance = np.maximum(scene @ LUMINANCE_2020, 0)[..., None]
@@ -81,15 +78,14 @@ def hlg_light(signal: np.ndarray) -> np.ndarray:
 
 
 def pq_light(signal: np.ndarray) -> np.ndarray:
-    """PQ signal -> display light, 1.0 at reference white: the EOTF (BT.2100, table 4; SMPTE ST 2084)."""
+    """Convert PQ to display light, 1.0 at reference white: the EOTF (BT.2100, table 4; SMPTE ST 2084)."""
     root = np.maximum(signal, 0) ** (1 / 78.84375)
     linear = (np.maximum(root - 0.8359375, 0) / (18.8515625 - 18.6875 * root)) ** (1 / 0.1593017578125)
     return linear * (10000 / WHITE_NITS)
 
 
 def into_gamut(light: np.ndarray) -> np.ndarray:
-    """Linear Rec. 709 light with negative parts -> none: such a colour is mixed with the grey of its own luminance just
-    so far, others stay exactly."""
+    """Mix linear Rec. 709 light with grey of its luminance, just so far that no part is negative."""
     luminance = np.maximum(light @ LUMINANCE, 0)[..., None]
     least = light.min(-1, keepdims=True)
     keep = np.where(least < 0, luminance / np.maximum(luminance - least, 1e-9), 1)
@@ -97,11 +93,10 @@ def into_gamut(light: np.ndarray) -> np.ndarray:
 
 
 def tone_curve(light: np.ndarray) -> np.ndarray:
-    """Display light [..., 3] from 0 up -> [0, 1): the identity up to KNEE_LINEAR, then a hyperbola of the same slope
-    towards 1.
+    """Compress display light [..., 3] to [0, 1): identity up to KNEE_LINEAR, then a hyperbola of the same slope.
 
-    It works on the largest channel and scales the others with it, so hues stay. Reference white becomes 0.9, 1000 nits
-    0.99.
+    It works on the largest channel and scales the others with it, so that hues stay. Reference white becomes 0.9, 1000
+    nits 0.99.
     """
     peak = light.max(-1, keepdims=True)
     over = np.maximum(peak - KNEE_LINEAR, 0) / (1 - KNEE_LINEAR)

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The video doctor: what is wrong with a capture as its frames show it, and how to shoot it again.
 
-`examine` measures a frame; `diagnose` says in sentences what the measures of all frames mean. Thresholds are of the
-frame as it is written.
+`examine` measures a frame as it is written; `diagnose` turns the measures of all frames into findings.
 """
 
 from __future__ import annotations
@@ -14,27 +13,25 @@ from skimage.measure import blur_effect
 
 from ...capture.frame_records import FrameRecord
 from ...capture.messages import Problem, Reporter, name_some
+from ...imaging import images
 from .select import inside_box, turns
 
 UNMEASURED = {"blur": 1.0, "brightness": 0.0, "clipped": 0.0, "noise": 0.0}
-"""Of what is too small to be measured, as a picture of one pixel."""
+"""Values for pictures too small to measure."""
 FEW_FRAMES = 12
-"""Below this many frames the result is accepted but the report warns."""
+"""The report warns if there are fewer."""
 BLURRED_CRETE = 0.68
-"""Crete's measure of a face that is blurred by about 7 px: sharp ones have 0.35 to 0.6, whatever they look like; at 9
-px it is 0.7 to 0.8."""
+"""Crete's measure of a face blurred by about 7 px; sharp faces have 0.35 to 0.6, at 9 px it is 0.7 to 0.8."""
 DARK_SRGB, CLIPPED_SHARE, NOISY_SRGB = 0.22, 0.06, 6 / 255
-"""sRGB of a face's bright quarter; share of a face's pixels at the end of the range; standard deviation of the noise in
-sRGB."""
+"""sRGB of a face's bright quarter; share of clipped pixels; standard deviation of the noise in sRGB."""
 SMALL_PX, FAR_SHARE = 160, 0.22
-"""Width of a face in pixels; and as a share of the shorter side of the picture."""
+"""Width of a face in pixels, and as a share of the picture's shorter side."""
 REACH_DEG, GAP_DEG = 32.0, 22.0
-"""How far to each side the head must be seen, by its landmarks; and the widest gap between neighbouring directions."""
+"""Required range of the head's turn to each side, and the widest gap between neighbouring directions."""
 DRIFT_RATIO = 1.12
-"""Ratio of the brightest frame's light to the darkest's above which the exposure is said to have changed."""
+"""Ratio of the brightest frame's light to the darkest's from which the exposure counts as changed."""
 EQUAL_RATIO, OFTEN_SHARE = 0.75, 0.5
-"""Prominence of a second face over the first above which nobody can say whom the video shows; and the share of frames
-in which it is so."""
+"""Prominence of a second face over the first at which the subject is unclear, and the share of frames with that."""
 
 FEW_SIDES = (
     "Take one from the front, one about 40 degrees to each side, both profiles, and some from below and "
@@ -44,26 +41,30 @@ FIND_FACE = "Film one face, upright, filling a third of the picture or more, and
 
 
 def examine(srgb: np.ndarray, box: tuple | None) -> dict:
-    """blur (Crete et al., "The Blur Effect", 2007: 0 sharp, 1 blurred), and of the inside of the face's box (the middle
-    of the picture where there is none) brightness and noise in sRGB and the clipped share."""
+    """Measure blur (Crete et al., "The Blur Effect", 2007: 0 sharp, 1 blurred), brightness, clipping and noise.
+
+    Of the face's box, or the middle of the picture; brightness and noise in sRGB, clipped as a share.
+    """
     inside = inside_box(srgb, box)
     if min(inside.shape[:2]) < 24:
         inside = srgb
-    luma = inside @ np.array([0.299, 0.587, 0.114], np.float32)
-    # the corners of a face's box show what is behind it
+    luma = images.luma(inside)
+    # the corners of a face's box show the background
     rows, columns = (slice(n // 6, n - n // 6) for n in luma.shape)
-    told = {
+    measures = {
         "blur": round(float(blur_effect(luma)), 4),
         "brightness": round(float(np.percentile(luma[rows, columns], 75)), 4),
         "clipped": round(float((inside[rows, columns].max(-1) > 0.99).mean()), 4),
         "noise": round(_noise(luma), 5),
     }
-    return {name: value if np.isfinite(value) else UNMEASURED[name] for name, value in told.items()}
+    return {name: value if np.isfinite(value) else UNMEASURED[name] for name, value in measures.items()}
 
 
 def blurred(records: list[FrameRecord], around: int = 10) -> np.ndarray:
-    """Which frames [N] are much more blurred than those around them; at most a third, and never so many that few are
-    left."""
+    """Return which frames [N] are much more blurred than those around them.
+
+    At most a third, and never so many that few are left.
+    """
     blur = np.array([r.blur for r in records])
     usual = np.array([np.median(blur[max(0, i - around) : i + around + 1]) for i in range(len(blur))])
     worse = np.where(blur > 0.55, blur - usual - 0.08, 0)
@@ -74,23 +75,13 @@ def blurred(records: list[FrameRecord], around: int = 10) -> np.ndarray:
 
 
 def diagnose(records: list[FrameRecord], dropped: list[str], photographs: bool, report: Reporter) -> None:
-    """Reports a finding for each shortcoming of the kept frames.
+    """Report a finding for each shortcoming of the kept frames; `dropped`: names of those left out as blurred.
 
-    Parameters
-    ----------
-    records : of the frames that are kept
-    dropped : names of those left out as blurred
-    photographs : whether they are, and no film's frames
-    report : takes the findings
-
-    Raises
-    ------
-    Problem
-        Where they show no face, or it is not clear whose face is meant.
+    Raises Problem if no frame shows a face, or two faces compete.
     """
     with_face = [r for r in records if r.face_box]
     if not with_face:
-        raise Problem("A face was found only in frames that are blurred and were left out.", FIND_FACE)
+        raise Problem("The only frames with a face are blurred and were left out.", FIND_FACE)
     count, shots = len(records), "photographs" if photographs else "frames"
     _other_faces(with_face, shots, report)
     if count < FEW_FRAMES:
@@ -102,13 +93,13 @@ def diagnose(records: list[FrameRecord], dropped: list[str], photographs: bool, 
         )
         report.finding(
             f"{there}: expect {expect}, and a texture from few directions.",
-            "Take 60 or more around the face for a full one.",
+            "Take 60 or more around the face for a complete head.",
         )
     lost = [r.name for r in records if not r.face_box]
     if len(lost) > 0.4 * count:
         report.finding(
             f"No face was found in {len(lost)} of {count} {shots}.",
-            "Keep the whole face in the picture all the time, upright and well lit.",
+            "Keep the whole face in the picture, upright and well lit.",
             lost,
         )
     _angles(records, photographs, report)
@@ -121,7 +112,7 @@ def _other_faces(records: list[FrameRecord], shots: str, report: Reporter) -> No
     second = [r for r in records if r.other_face > 0]
     if sum(r.other_face > EQUAL_RATIO for r in records) > OFTEN_SHARE * len(records):
         raise Problem(
-            "There are two faces in the picture, and it is not clear which one is meant.",
+            "There are two faces in the picture, and it is not clear whose head to build.",
             f"Film one person alone, or crop the {'video' if shots == 'frames' else shots} so that one face "
             "fills the middle of the picture.",
         )
@@ -135,7 +126,7 @@ def _other_faces(records: list[FrameRecord], shots: str, report: Reporter) -> No
 
 
 def _angles(records: list[FrameRecord], photographs: bool, report: Reporter) -> None:
-    # the neighbours of a photograph in the alphabet say nothing about it
+    # photographs are in alphabetical order, so neighbours say nothing about one without a face
     turn = np.array([r.yaw_deg for r in records if r.yaw_deg is not None]) if photographs else turns(records)
     turn = np.sort(turn[np.isfinite(turn)])
     again = (
@@ -146,15 +137,14 @@ def _angles(records: list[FrameRecord], photographs: bool, report: Reporter) -> 
     left, right = -turn[0], turn[-1]
     if max(left, right) < REACH_DEG:
         report.finding(
-            "The face is seen from in front only: "
-            f"the camera came {max(left, 0):.0f} degrees around to its left and {max(right, 0):.0f} to its "
-            "right.",
+            f"The face is seen from the front only: the camera moved {max(left, 0):.0f} degrees around to its left "
+            f"and {max(right, 0):.0f} to its right.",
             again,
         )
     elif min(left, right) < REACH_DEG:
         side, reach = ("left", left) if left < right else ("right", right)
         report.finding(
-            f"The {side} side of the face is hardly seen: the camera came only {reach:.0f} degrees around to it."
+            f"The {side} side of the face is hardly seen: the camera moved only {reach:.0f} degrees around to it."
             if reach > 0
             else f"The {side} side of the face is not seen at all.",
             again,
@@ -198,13 +188,13 @@ def _light(records: list[FrameRecord], report: Reporter) -> None:
     if np.median(clipped) > CLIPPED_SHARE:
         report.finding(
             f"The face is overexposed: {np.median(clipped):.0%} of it has no colour left.",
-            "Tap on the brightest part of the face and draw the exposure down before filming.",
+            "Tap on the brightest part of the face and lower the exposure before filming.",
             _names([r for r in records if r.clipped > CLIPPED_SHARE]),
         )
     if np.median(noise) > NOISY_SRGB:
         report.finding(
-            "The picture is noisy, which the maps would take for pores.",
-            "Film in more light, and without digital zoom.",
+            "The picture is noisy, and the noise would pass for pores.",
+            "Film in more light and without digital zoom.",
         )
     gain = np.array([r.gain for r in records])
     tone = gain / gain.mean(1, keepdims=True)
@@ -247,8 +237,10 @@ def _names(records: list[FrameRecord]) -> list[str]:
 
 
 def _noise(luma: np.ndarray) -> float:
-    """Standard deviation of the noise in the smoother half of a picture (Immerkaer, "Fast Noise Variance Estimation",
-    1996), by the median."""
+    """Return the deviation of the noise in the smoother half of a picture, by the median.
+
+    Immerkaer, "Fast Noise Variance Estimation", 1996.
+    """
     laplacian = np.abs(cv2.filter2D(luma, -1, np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)))
     smooth = cv2.GaussianBlur(luma, (0, 0), 1.5)
     slope = np.abs(cv2.Sobel(smooth, cv2.CV_32F, 1, 0)) + np.abs(cv2.Sobel(smooth, cv2.CV_32F, 0, 1))

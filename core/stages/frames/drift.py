@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exposure and white balance that a phone changed while it filmed: one gain per frame and channel, from what the frames
-have in common.
+"""Exposure and white balance that a phone changed while filming: one gain per frame and channel.
 
-The same spots are found in neighbouring frames (SIFT; Lowe 2004) and their colours compared, on the person and behind
-it. A gain is believed only where it explains most of the picture: a head that turns into the shade changes more on one
-side, and what is behind it not at all.
+The same spots are found in neighbouring frames (SIFT; Lowe 2004) and their colours compared, on the person and behind.
+A gain is accepted only if it explains most of the picture: a head that turns into the shade changes more on one side,
+and its background not at all.
 """
 
 from __future__ import annotations
@@ -19,26 +18,28 @@ from ...face import faces
 from ...imaging import images
 
 WIDTH_PX = 480
-"""Longer side at which colours are compared, in pixels: fine detail and noise are gone, motion blur hardly matters."""
+"""Longer side of the pictures compared: fine detail and noise are gone, motion blur hardly matters."""
 SPOT_PX = 9
-"""Side of the square a spot's colour is averaged over, at that size."""
+"""Side of the square over which a spot's colour is averaged."""
 STEPS_FRAMES = (1, 2, 5, 12)
-"""How far apart frames are compared: neighbours are surest, far ones keep small errors from adding up."""
+"""Distances of compared frames: near ones are accurate, far ones keep small errors from adding up."""
 LEAST_SPOTS, LEAST_SHARE = 16, 0.5
-"""Spots that must follow a gain, and the share of all: fewer explain no picture."""
+"""Minimum number and share of spots that agree with a gain."""
 TOLERANCE_LOG = 0.08
-"""How far a spot may be from the common gain to follow it, in natural logarithms (8 %)."""
+"""Deviation from the common gain up to which a spot agrees, in natural log units (8 %)."""
 DOUBT_WEIGHT = 0.2
-"""Weight of a comparison that may be shading: it stands for no change, unless another one knows better."""
+"""Weight of a comparison that may be shading: it counts as no change."""
 STEADY_LOG = 0.08
-"""Whole range of the gains, in natural logarithms, up to which the light counts as constant and no picture is touched:
-what a steady video of 100 frames, blurred ones too, is measured to have. The texture evens out what is smaller."""
+"""Range of the gains, in natural log units, up to which no picture is changed: that of a steady video of 100 frames.
+The texture evens out what is smaller."""
 
 
 @dataclass(frozen=True)
 class Content:
-    """What one frame is compared by: descriptors uint8 [n, 128] of its spots, log_colour float32 [n, 3] (linear light),
-    place float32 [n, 2] (pixels of the small picture) and person bool [n]."""
+    """Spots of a frame: descriptors uint8 [n, 128], log_colour float32 [n, 3] (linear light), place float32 [n, 2].
+
+    place is in pixels of the small picture; person bool [n]: on the person.
+    """
 
     descriptors: np.ndarray
     log_colour: np.ndarray
@@ -47,15 +48,13 @@ class Content:
 
 
 def content_of(srgb: np.ndarray) -> Content:
-    """The spots of a frame, sRGB [H, W, 3], that are neither clipped nor black."""
+    """Return the spots of a frame, sRGB [H, W, 3], that are neither clipped nor black."""
     scale = WIDTH_PX / max(srgb.shape[:2])
     small = images.resize(srgb, round(srgb.shape[1] * scale), round(srgb.shape[0] * scale))
-    grey = np.clip(small @ np.array([0.299, 0.587, 0.114], np.float32) * 255, 0, 255).astype(np.uint8)
-    points, descriptors = _sift().detectAndCompute(grey, None)
+    grey = np.clip(images.luma(small) * 255, 0, 255).astype(np.uint8)
+    points, descriptors = cv2.SIFT_create(600, contrastThreshold=0.015).detectAndCompute(grey, None)
     if not points:
-        return Content(
-            np.zeros((0, 128), np.uint8), np.zeros((0, 3), np.float32), np.zeros((0, 2), np.float32), np.zeros(0, bool)
-        )
+        return Content(*(np.zeros((0, width), np.float32) for width in (128, 3, 2)), np.zeros(0, bool))
     x, y = np.array([p.pt for p in points]).round().astype(int).T
     x, y = np.clip(x, 0, small.shape[1] - 1), np.clip(y, 0, small.shape[0] - 1)
     mean = cv2.blur(images.srgb_to_linear(small), (SPOT_PX, SPOT_PX))[y, x]
@@ -72,8 +71,10 @@ def content_of(srgb: np.ndarray) -> Content:
 
 @dataclass(frozen=True)
 class Link:
-    """What two frames say of each other: gain [3] (log of the second's light over the first's), weight (how many saw
-    it), and whether the change is shading of the person rather than exposure, where nothing else could be compared."""
+    """Comparison of two frames: gain [3], the log of the second's light over the first's, and its weight.
+
+    person: nothing but the person could be compared; shading: the change is shading rather than exposure.
+    """
 
     gain: np.ndarray
     weight: float
@@ -82,15 +83,14 @@ class Link:
 
 
 def gains_of(contents: list[Content], check=lambda: None) -> np.ndarray:
-    """Factors [N, 3] in linear light that even the frames out, 1 for the median frame; exactly 1 throughout where the
-    light is steady.
+    """Return factors [N, 3] in linear light that even the frames out, 1 for the median frame.
 
-    `check` is called between comparisons.
+    Exactly 1 throughout if the light is steady. `check` is called between comparisons.
     """
     count = len(contents)
     turning = np.zeros(count, bool)
     pairs, links = [], []
-    # far ones first: what is shading shows over a wide turn, from one frame to the next it does not
+    # far ones first: shading shows over a wide turn, not from one frame to the next
     for step in sorted(STEPS_FRAMES, reverse=True):
         for i in range(count - step):
             check()
@@ -104,17 +104,16 @@ def gains_of(contents: list[Content], check=lambda: None) -> np.ndarray:
             links.append(link)
     if not links:
         return np.ones((count, 3))
-    levels = _levels(
-        count, np.array(pairs), np.array([link.gain for link in links]), np.array([link.weight for link in links])
-    )
+    ratios, weights = np.array([link.gain for link in links]), np.array([link.weight for link in links])
+    levels = _levels(count, np.array(pairs), ratios, weights)
     levels -= np.median(levels, axis=0)
     return np.exp(-levels) if np.ptp(levels, axis=0).max() > STEADY_LOG else np.ones((count, 3))
 
 
 def compare(a: Content, b: Content) -> Link | None:
-    """What two frames have in common, or None where no one gain explains what both show.
+    """Compare two frames; None if no single gain explains what both show.
 
-    Where there is enough to see behind the person, that decides: a turning head shades itself, a wall does not.
+    The background decides if enough of it is visible: a turning head shades itself, a wall does not.
     """
     if min(len(a.place), len(b.place)) < LEAST_SPOTS:
         return None
@@ -125,17 +124,14 @@ def compare(a: Content, b: Content) -> Link | None:
     if common is not None:
         return Link(*common[:2])
     common = _common(ratio[person], place[person])
-    if common is None:
-        return (
-            Link(np.zeros(3), float(person.sum()), True, True)
-            if _slanted(ratio[person].mean(1), place[person])
-            else None
-        )
-    return Link(*common[:2], True, common[2])
+    if common is not None:
+        return Link(*common[:2], True, common[2])
+    slanted = _slanted(ratio[person].mean(1), place[person])
+    return Link(np.zeros(3), float(person.sum()), True, True) if slanted else None
 
 
 def _matches(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Indices into descriptors [n, 128] and [m, 128] of those that are each other's nearest, and near."""
+    """Return indices into descriptors [n, 128] and [m, 128] of mutual nearest neighbours that are close."""
     unit = [
         d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1)
         for d in (a.astype(np.float32), b.astype(np.float32))
@@ -147,36 +143,40 @@ def _matches(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _common(ratio: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, float, bool] | None:
-    """The log gain [3] that most spots [n, 3] share, every square of the picture having one voice; its weight; and
-    whether it differs between the ends of the area [n, 2], as shading does and exposure does not. Or None."""
+    """Return the log gain [3] shared by most spots [n, 3], its weight, and whether it is shading; or None.
+
+    Every square of the picture has one vote. Shading differs between the ends of the area [n, 2], exposure does not.
+    """
     if len(ratio) < LEAST_SPOTS:
         return None
     cell = (place // 60).astype(int) @ [1, 64]
-    voice = 1 / np.bincount(cell)[cell] ** 0.5
-    centre = np.array([_weighted_median(channel, voice) for channel in ratio.T])
-    follows = np.abs(ratio - centre).max(1) < TOLERANCE_LOG
-    if follows.sum() < LEAST_SPOTS or voice[follows].sum() < LEAST_SHARE * voice.sum():
+    weight = 1 / np.bincount(cell)[cell] ** 0.5
+    centre = np.array([_weighted_median(channel, weight) for channel in ratio.T])
+    agree = np.abs(ratio - centre).max(1) < TOLERANCE_LOG
+    if agree.sum() < LEAST_SPOTS or weight[agree].sum() < LEAST_SHARE * weight.sum():
         return None
-    ratio, place, voice = ratio[follows], place[follows], voice[follows]
-    gain = np.average(ratio, axis=0, weights=voice)
+    ratio, place, weight = ratio[agree], place[agree], weight[agree]
+    gain = np.average(ratio, axis=0, weights=weight)
     offset = (place - place.mean(0)) / np.maximum(place.std(0), 1)
-    slope = np.linalg.lstsq(offset * voice[:, None], (ratio - gain).mean(1) * voice, rcond=None)[0]
+    slope = np.linalg.lstsq(offset * weight[:, None], (ratio - gain).mean(1) * weight, rcond=None)[0]
     slant, noise = 3 * np.linalg.norm(slope), 9 * (ratio - gain).mean(1).std() / len(ratio) ** 0.5
-    return gain, float(voice.sum()), bool(slant > max(noise, 0.5 * np.abs(gain).max()))
+    return gain, float(weight.sum()), bool(slant > max(noise, 0.5 * np.abs(gain).max()))
 
 
 def _slanted(ratio: np.ndarray, place: np.ndarray) -> bool:
-    """Whether log ratios [n] that have no value in common lie on a slope across the picture [n, 2]: shading, not wrong
-    matches."""
+    """Return whether log ratios [n] without a common value lie on a slope across the picture [n, 2].
+
+    Then they are shading, not wrong matches.
+    """
     if len(ratio) < LEAST_SPOTS:
         return False
     ones = np.concatenate([(place - place.mean(0)) / np.maximum(place.std(0), 1), np.ones((len(place), 1))], 1)
     error = ratio - np.median(ratio)
-    before, left = np.median(np.abs(error)), error
+    rest = error
     for _ in range(5):
-        voice = 1 / np.sqrt(np.maximum(np.abs(left), 0.02))
-        left = error - ones @ np.linalg.lstsq(ones * voice[:, None], error * voice, rcond=None)[0]
-    return bool(np.median(np.abs(left)) < 0.6 * before)
+        weight = 1 / np.sqrt(np.maximum(np.abs(rest), 0.02))
+        rest = error - ones @ np.linalg.lstsq(ones * weight[:, None], error * weight, rcond=None)[0]
+    return bool(np.median(np.abs(rest)) < 0.6 * np.median(np.abs(error)))
 
 
 def _weighted_median(samples: np.ndarray, weights: np.ndarray) -> float:
@@ -186,8 +186,7 @@ def _weighted_median(samples: np.ndarray, weights: np.ndarray) -> float:
 
 
 def _levels(count: int, pairs: np.ndarray, ratios: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Log light of every frame [N, 3] from the links' differences by least squares, links that contradict the rest
-    losing their say."""
+    """Solve for the log light of every frame [N, 3] from the links by least squares, robustly."""
     from scipy.sparse import coo_matrix, diags
     from scipy.sparse.linalg import spsolve
 
@@ -205,7 +204,3 @@ def _levels(count: int, pairs: np.ndarray, ratios: np.ndarray, weights: np.ndarr
         error = np.abs(draw @ levels - ratios).max(1)
         trust = np.minimum(1, 0.01 / np.maximum(error, 1e-9))
     return levels
-
-
-def _sift():
-    return cv2.SIFT_create(600, contrastThreshold=0.015)

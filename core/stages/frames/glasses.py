@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Glasses in a capture: its frames are asked one by one, and only where nearly all agree is it refused. A false refusal
-is worse than a miss."""
+"""Glasses in a capture: it is refused only if nearly all frames agree, as a false refusal is worse than a miss."""
 
 from __future__ import annotations
 
@@ -12,30 +11,30 @@ import numpy as np
 from ...capture.messages import Problem, Reporter
 
 SURE_LOG_ODDS, AGREE_SHARE, FEWEST_FRAMES = 1.0, 0.8, 3
-"""From which logarithm of the odds a frame is sure of glasses; which share of the frames has to be for a refusal, and
-how many have to tell at all."""
+"""Refuse if, of so many frames or more, this share has at least these log odds."""
 LIKELY_LOG_ODDS, LIKELY_SHARE = 0.5, 0.5
-"""From which logarithm of the odds a frame counts as one with glasses, and from which share of such frames the report
-warns."""
+"""Warn if this share of the frames has at least these log odds."""
 
 
 def judge(sureness: Sequence[float], no_glasses: bool, report: Reporter) -> None:
-    """sureness: of each frame, as face.glasses tells it, nan where it cannot. Raises Problem where the person surely
-    wears glasses and the artist does not say otherwise (no_glasses)."""
-    told = np.array([each for each in sureness if np.isfinite(each)])
-    if not len(told):
+    """Judge each frame's log odds of glasses (face.glasses; nan: unknown).
+
+    Raises Problem if the person surely wears glasses and the artist does not say otherwise (no_glasses).
+    """
+    odds = np.array([each for each in sureness if np.isfinite(each)])
+    if not len(odds):
         return
-    report.figure("frames_with_glasses_percent", round(100 * float((told > LIKELY_LOG_ODDS).mean())))
-    if no_glasses or (told > LIKELY_LOG_ODDS).mean() < LIKELY_SHARE:
+    likely, sure = odds > LIKELY_LOG_ODDS, odds > SURE_LOG_ODDS
+    report.figure("frames_with_glasses_percent", round(100 * float(likely.mean())))
+    if no_glasses or likely.mean() < LIKELY_SHARE:
         return
-    if len(told) >= FEWEST_FRAMES and (told > SURE_LOG_ODDS).mean() >= AGREE_SHARE:
+    if len(odds) >= FEWEST_FRAMES and sure.mean() >= AGREE_SHARE:
         raise Problem(
-            f"The person wears glasses in {(told > SURE_LOG_ODDS).sum()} of {len(told)} frames, which would be built "
-            "into the head.",
+            f"The person wears glasses in {sure.sum()} of {len(odds)} frames, and they would become part of the head.",
             "Film without glasses. If there are none, switch on No Glasses in the settings of Frames (--set "
             "frames.no_glasses=true).",
         )
     report.finding(
-        f"The person may wear glasses: {(told > LIKELY_LOG_ODDS).sum()} of {len(told)} frames look like it.",
-        "Film without glasses: they bend what lies behind them, and rims are built into the head.",
+        f"The person may wear glasses: {likely.sum()} of {len(odds)} frames look like it.",
+        "Film without glasses: they distort what lies behind them, and their rims become part of the head.",
     )

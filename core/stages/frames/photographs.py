@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folders of photographs, in the order of their names, upright by their EXIF orientation, Display P3 and
-Adobe RGB brought to sRGB."""
+"""Folders of photographs, in order of their names, upright; Display P3 and Adobe RGB are converted to sRGB."""
 
 from __future__ import annotations
 
@@ -17,27 +16,16 @@ from .colour import from_profile
 from .source import Picture, evenly, fit
 
 UNREAD = {".dng": "raw", ".avif": "AVIF"}
-"""Suffix -> kind of photographs that are not read."""
+"""Suffix -> kind of photographs that are not supported."""
 FEATURES_PX = 2000
-"""Longer side of the pictures that cameras are found by: photographs lie far apart, and what still matches between them
-is fine."""
+"""Longer side of the pictures that cameras are found by: of photographs far apart only fine features match."""
 AS_JPEG = "Export them as JPEG or PNG."
 
 
 def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) -> Iterator[Picture]:
-    """Photographs of a folder, evenly spread; those that cannot be read are left out, with a finding.
+    """Yield at most `most` photographs of a folder, evenly spread, shrunk to `long_side` pixels.
 
-    Parameters
-    ----------
-    folder : that holds them
-    most : how many at most
-    long_side : pixels; larger ones are shrunk to it
-    report : takes the findings
-
-    Raises
-    ------
-    Problem
-        Where there are none, or none can be read.
+    Unreadable ones are left out, with a finding. Raises Problem if there are none, or none can be read.
     """
     files = sorted(p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
     pictures = [p for p in files if p.suffix.lower() in PHOTOGRAPHS]
@@ -45,15 +33,13 @@ def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) 
     kinds = " and ".join(sorted(set(unread), reverse=True))
     if not pictures:
         if unread:
-            raise Problem(f"The photographs in {folder.name} are {kinds} files, which cannot be read.", AS_JPEG)
+            raise Problem(f"The photographs in {folder.name} are {kinds} files, which are not supported.", AS_JPEG)
         raise Problem(
             f"There are no photographs in {folder}.",
             "Choose a folder with JPEG, HEIC, PNG, TIFF or WebP pictures of the face, or a video.",
         )
     if unread:
-        report.finding(
-            f"{len(unread)} {kinds} files were left out beside {len(pictures)} photographs that can be read.", AS_JPEG
-        )
+        report.finding(f"{len(unread)} {kinds} files were left out; {len(pictures)} photographs can be read.", AS_JPEG)
     chosen, left_out, unknown = evenly(len(pictures), most), {}, {}
     for done, index in enumerate(chosen, 1):
         path = pictures[index]
@@ -79,7 +65,7 @@ def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) 
         raise Problem(f"None of the photographs in {folder.name} could be read.", next(iter(left_out.values())))
     for profile, names in unknown.items():
         report.finding(
-            f"The colours of {name_some(names)} are taken for sRGB, and their profile is {profile}.",
+            f"The colours of {name_some(names)} are taken for sRGB, but their profile is {profile}.",
             "Export them in sRGB, Display P3 or Adobe RGB.",
         )
     if left_out:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What both kinds of source hand on: a picture with its place in the source, and the sampling they share."""
+"""A picture of a video or a folder of photographs, and the sampling that both share."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ from ...imaging import images
 
 @dataclass(frozen=True)
 class Picture:
-    """One sampled picture: srgb [H, W, 3] upright and at its final size, index in the source (decoded frame or sorted
-    file), time_s (None for a photograph), source (file name of a photograph), focal_px at this size where the file says
-    it, how far the reading is: `done` of `of`; and full [h, w, 3], the same picture larger, for the features that
-    cameras are found by, where there is one."""
+    """A sampled picture: srgb [H, W, 3], upright and at its final size, and its place in the source.
+
+    index: decoded frame or sorted file; time_s: None for a photograph; source: file name of a photograph; focal_px at
+    this size if the file states it; progress of the reading, `done` of `of`; full [h, w, 3]: the same picture larger,
+    for the features that cameras are found by, if there is one.
+    """
 
     srgb: np.ndarray
     index: int
@@ -29,13 +31,12 @@ class Picture:
 
 
 def evenly(count: int, most: int) -> np.ndarray:
-    """At most `most` indices of 0 ... count-1 at equal intervals, first and last among them."""
+    """Return at most `most` indices of 0 ... count-1 at equal intervals, first and last included."""
     return np.arange(count) if count <= most else np.round(np.linspace(0, count - 1, most)).astype(int)
 
 
 def evenly_in_time(times: np.ndarray, most: int) -> np.ndarray:
-    """At most `most` indices of ascending time stamps [N], nearest to equal intervals of time, first and last among
-    them.
+    """Return at most `most` indices of ascending time stamps [N] nearest to equal intervals, first and last included.
 
     A pause in the recording counts as no more than thirty frames.
     """
@@ -48,12 +49,12 @@ def evenly_in_time(times: np.ndarray, most: int) -> np.ndarray:
 
 
 def fitted(width: float, height: float, long_side: int) -> tuple[int, int]:
-    """Width and height in whole pixels, shrunk so that the longer one is at most `long_side`; never enlarged."""
+    """Return width and height shrunk so that the longer one is at most `long_side`; never enlarged."""
     scale = min(1.0, long_side / max(width, height))
     return max(1, round(float(width * scale))), max(1, round(float(height * scale)))
 
 
 def fit(pixels: np.ndarray, long_side: int) -> np.ndarray:
-    """[H, W, 3] shrunk so that its longer side is at most `long_side`; never enlarged."""
+    """Shrink [H, W, 3] so that its longer side is at most `long_side`; never enlarge."""
     width, height = fitted(pixels.shape[1], pixels.shape[0], long_side)
     return pixels if (height, width) == pixels.shape[:2] else images.resize(pixels, width, height)

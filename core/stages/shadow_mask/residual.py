@@ -11,11 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...light.spherical_harmonics import sh_polynomials
+from ...light.sunlight import OUTLIER_SHARE, expect, log_likelihood
 
 LUMINANCE_SIGMA_LOG = 0.15  # spread of lit skin about its smooth expectation, natural log units ...
 CHROMA_SIGMA_LOG = 0.06  # ... and of the differences between channels
-OUTLIER_SHARE = 0.05  # of the texels that are neither lit nor shaded skin
-OUTLIER_RANGE_LOG = 3.0  # log units over which an outlier may lie, per channel
 LEAST_STEP_LOG = 0.3  # a shadow takes a quarter of the light or more; flushed noses and beards take less
 LEAST_LIKELIHOOD_GAIN = 0.08  # of log likelihood per texel over a texture without shadow
 FIRST_STEPS_LOG = (-0.4, -0.8, -1.3)  # darkenings that the fit starts from, natural log units
@@ -57,27 +56,17 @@ def _expectation_maximisation(log, basis, step, iterations, fixed=False):
         residual = log - basis @ smooth
         if not fixed:
             step = (residual * (dark * inlier)[:, None]).sum(0) / max((dark * inlier).sum(), 1e-6)
-        terms = np.stack(  # [3, N]
-            [
-                np.log(share) + np.log1p(-OUTLIER_SHARE) + _log_likelihood(residual - step),
-                np.log1p(-share) + np.log1p(-OUTLIER_SHARE) + _log_likelihood(residual),
-                np.full(count, np.log(OUTLIER_SHARE) - 3 * np.log(OUTLIER_RANGE_LOG)),
-            ]
+        shaded, inlier, evidence = expect(
+            np.log(share) + np.log1p(-OUTLIER_SHARE) + _log_likelihood(residual - step),
+            np.log1p(-share) + np.log1p(-OUTLIER_SHARE) + _log_likelihood(residual),
         )
-        peak = terms.max(0)
-        shares = np.exp(terms - peak)
-        inlier = 1 - shares[2] / shares.sum(0)
-        if not fixed:
-            dark = shares[0] / np.maximum(shares[0] + shares[1], 1e-30)
-            share = float(np.clip((dark * inlier).sum() / max(inlier.sum(), 1e-6), 0.01, 0.9))
-    return float((peak + np.log(shares.sum(0))).sum()), smooth, step
+        dark = np.zeros(count) if fixed else shaded
+        share = share if fixed else float(np.clip((dark * inlier).sum() / max(inlier.sum(), 1e-6), 0.01, 0.9))
+    return float(evidence.sum()), smooth, step
 
 
 def _log_likelihood(residual: np.ndarray) -> np.ndarray:
-    common = residual.mean(-1)
-    chroma = residual - common[..., None]
-    squares = 3 * common**2 / LUMINANCE_SIGMA_LOG**2 + (chroma**2).sum(-1) / CHROMA_SIGMA_LOG**2
-    return -0.5 * squares - np.log(LUMINANCE_SIGMA_LOG * CHROMA_SIGMA_LOG**2 * (2 * np.pi) ** 1.5)
+    return log_likelihood(residual, LUMINANCE_SIGMA_LOG, CHROMA_SIGMA_LOG)
 
 
 def smooth_basis(normals: np.ndarray) -> np.ndarray:

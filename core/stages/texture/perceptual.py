@@ -21,6 +21,7 @@ from ...capture.messages import Reporter
 from ...face.head import Unfolded
 from ...geometry import raster
 from ...imaging import images
+from ...solver.upsampling.network import linear_to_srgb
 from .blend import blurred
 from .features import Features
 from .held_picture import DARKEST_LINEAR
@@ -170,8 +171,7 @@ def _losses(log_texture: Tensor, tiles: list, features: Features, report: Report
 
 
 def _srgb(linear: Tensor) -> Tensor:
-    linear = linear.clamp(DARKEST_LINEAR / 4, 1.0)
-    return torch.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear.clamp(min=0.0031308) ** (1 / 2.4) - 0.055)
+    return linear_to_srgb(linear.clamp(DARKEST_LINEAR / 4, 1.0))
 
 
 def _tensor(picture: np.ndarray, device: str | torch.device) -> Tensor:

@@ -82,29 +82,28 @@ def synthesized(tmp_path_factory):
     return path, model
 
 
+def with_lenses_of(true) -> pycolmap.Reconstruction:
+    model = pycolmap.Reconstruction()
+    for lens in true.cameras.values():
+        model.add_camera_with_trivial_rig(pycolmap.Camera(lens.todict()))
+    return model
+
+
 def test_frames_that_are_placed_by_the_others_lie_where_they_were(synthesized):
     path, true = synthesized
-    images = sorted((image for image in true.images.values()), key=lambda image: image.name)
+    images = sorted(true.images.values(), key=lambda image: image.name)
     left_out = images[1::3]
     names = {image.name for image in left_out}
-    kept = pycolmap.Reconstruction()
-    for lens in true.cameras.values():
-        kept.add_camera_with_trivial_rig(pycolmap.Camera(lens.todict()))
+    kept = with_lenses_of(true)
     for image in images:
         if image.name not in names:
             pixels = np.array([point.xy for point in image.points2D])
             seen = pycolmap.Image(name=image.name, camera_id=image.camera_id, image_id=image.image_id, keypoints=pixels)
             kept.add_image_with_trivial_frame(seen, true.images[image.image_id].cam_from_world())
     for point in true.points3D.values():
-        track = pycolmap.Track(
-            [
-                pycolmap.TrackElement(e.image_id, e.point2D_idx)
-                for e in point.track.elements
-                if e.image_id in kept.images
-            ]
-        )
-        if track.length() > 1:
-            kept.add_point3D(point.xyz, track, point.color)
+        elements = [element for element in point.track.elements if element.image_id in kept.images]
+        if len(elements) > 1:
+            kept.add_point3D(point.xyz, pycolmap.Track(elements), point.color)
     before, said = kept.num_reg_images(), []
     skeleton.place_others(kept, path, [image.name for image in left_out], 0, lambda done, of: said.append((done, of)))
     assert kept.num_reg_images() == before + len(left_out) and said[-1] == (len(left_out), len(left_out))
@@ -118,9 +117,7 @@ def test_frames_that_are_placed_by_the_others_lie_where_they_were(synthesized):
 
 def test_a_frame_that_shares_too_little_is_left_out(synthesized):
     path, true = synthesized
-    empty = pycolmap.Reconstruction()
-    for lens in true.cameras.values():
-        empty.add_camera_with_trivial_rig(pycolmap.Camera(lens.todict()))
+    empty = with_lenses_of(true)
     names = sorted(image.name for image in true.images.values())
     skeleton.place_others(empty, path, names, 0, lambda done, of: None)
     assert empty.num_reg_images() == 0
@@ -128,12 +125,11 @@ def test_a_frame_that_shares_too_little_is_left_out(synthesized):
 
 @pytest.fixture(scope="module")
 def filmed(tmp_path_factory):
-    """Eleven pictures of a person before a wall, five degrees from one to the next."""
+    """Nine pictures of a person before a wall, five degrees from one to the next."""
     folder = tmp_path_factory.mktemp("filmed")
-    for i in range(11):
-        images.write_srgb(
-            folder / f"{i:05d}.jpg", photograph(place_camera(5 * i - 25, 0.05 * np.sin(i), scale=2)), quality=95
-        )
+    for i in range(9):
+        picture = photograph(place_camera(5 * i - 20, 0.05 * np.sin(i), scale=1.5))
+        images.write_srgb(folder / f"{i:05d}.jpg", picture, quality=95)
     return folder
 
 
@@ -144,7 +140,7 @@ def solved(folder, work, sharpest_first=True):
     names = sorted(path.name for path in folder.iterdir())
     job = {
         "images": str(folder),
-        "groups": [{"names": names, "width": 600, "height": 800, "focal_px": None}],
+        "groups": [{"names": names, "width": 450, "height": 600, "focal_px": None}],
         "skin": False,
         "photographs": False,
         "film": [(name, float(-i if sharpest_first else i), None) for i, name in enumerate(names)],
@@ -162,7 +158,7 @@ def solved(folder, work, sharpest_first=True):
 
 def test_the_order_in_which_features_are_found_changes_no_byte(filmed, tmp_path, monkeypatch):
     """Threads end in any order; here, once as they do, and once from the last picture to the first."""
-    monkeypatch.setattr(skeleton, "CARRYING_FRAMES", 7)
+    monkeypatch.setattr(skeleton, "CARRYING_FRAMES", 6)
     monkeypatch.setattr(colmap, "FILM_FEATURES", 400)  # of which these small pictures have half
     extract, order = pycolmap.extract_features, []
 
@@ -177,19 +173,19 @@ def test_the_order_in_which_features_are_found_changes_no_byte(filmed, tmp_path,
     # nobody wants, and would get no other either
     monkeypatch.setattr(colmap, "_aside", lambda function, *arguments: function(*arguments))
     reversed_, _ = solved(filmed, tmp_path / "reversed")
-    assert len(registered) == 11 and set(order) == set(registered) and order != sorted(order)
+    assert len(registered) == 9 and set(order) == set(registered) and order != sorted(order)
     assert reversed_ == straight
 
 
 def test_what_lies_beyond_a_chosen_frame_that_is_not_mapped_is_placed_by_those_that_are(filmed, tmp_path, monkeypatch):
     """As at the end of a long film, whose outermost chosen frame shows too little to be mapped."""
-    monkeypatch.setattr(skeleton, "CARRYING_FRAMES", 7)
+    monkeypatch.setattr(skeleton, "CARRYING_FRAMES", 6)
     monkeypatch.setattr(colmap, "FILM_FEATURES", 400)
     monkeypatch.setattr(colmap, "LEAST_CARRIED_SHARE", 0.8)
     map_, chosen = colmap._map, []
     monkeypatch.setattr(colmap, "_map", lambda job, names: chosen.extend(names) or map_(job, names[1:]))
     _, registered = solved(filmed, tmp_path / "work", sharpest_first=False)
-    assert chosen[0] == "00001.jpg" and len(registered) == 11
+    assert chosen[0] == "00001.jpg" and len(registered) == 9
     pairs = read_matches(tmp_path / "work" / "database.db").pairs
     assert {two for one, two in pairs if one == "00000.jpg"} == set(chosen[1:3])
 

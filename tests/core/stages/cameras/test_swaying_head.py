@@ -109,11 +109,10 @@ def test_frames_that_do_not_tell_are_placed_by_those_that_do():
     assert after < 0.25 * before and after < 0.3
 
 
-@pytest.mark.parametrize("noise_px", [0.3, 1.0])
-def test_a_head_at_rest_keeps_the_cameras_of_the_room(monkeypatch, noise_px):
+def test_a_head_at_rest_keeps_the_cameras_of_the_room(monkeypatch):
     """However noisy: poses of its own would fit all matches better, and tell nothing of those that had no say in
     them."""
-    monkeypatch.setattr(f"{__name__}.NOISE_PX", noise_px)
+    monkeypatch.setattr(f"{__name__}.NOISE_PX", 1.0)
     model, matches, _, _ = filmed(0.0, 0.0)
     settled, left = settle(model, IN_HEAD, matches, Reporter("cameras"))
     assert settled is model and left > 1

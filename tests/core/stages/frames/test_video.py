@@ -21,28 +21,29 @@ WEIGHTS = {1: (0.2126, 0.0722), 5: (0.299, 0.114), 9: (0.2627, 0.0593)}
 """Kr and Kb of the matrices Rec. 709, Rec. 601 and Rec. 2020."""
 
 
+def scales(bits: int, full: bool) -> tuple[float, float, float, float]:
+    """Black, the range of Y, the middle and the range of Cb and Cr."""
+    step, top = 2.0 ** (bits - 8), 2.0**bits - 1
+    return (0.0, top, 128 * step, top) if full else (16 * step, 219 * step, 128 * step, 224 * step)
+
+
 def planes(signal: np.ndarray, matrix: int, bits: int, full: bool) -> list[np.ndarray]:
     """A signal [H, W, 3] as Y, Cb, Cr of 4:2:0, by the standards' own formulas: no library is trusted here."""
     red, blue = WEIGHTS[matrix]
     y = signal @ np.array([red, 1 - red - blue, blue])
     cb, cr = (signal[..., 2] - y) / (2 - 2 * blue), (signal[..., 0] - y) / (2 - 2 * red)
-    step, top = 2 ** (bits - 8), 2**bits - 1
-    scale, low, chroma = (top, 0, top) if full else (219 * step, 16 * step, 224 * step)
+    low, luma, middle, chroma = scales(bits, full)
     kind = np.uint16 if bits > 8 else np.uint8
-    return [
-        np.round(p).astype(kind)
-        for p in (low + scale * y, 128 * step + chroma * cb[::2, ::2], 128 * step + chroma * cr[::2, ::2])
-    ]
+    stored = (low + luma * y, middle + chroma * cb[::2, ::2], middle + chroma * cr[::2, ::2])
+    return [np.round(plane).astype(kind) for plane in stored]
 
 
 def signal_of(y: np.ndarray, cb: np.ndarray, cr: np.ndarray, matrix: int, bits: int, full: bool) -> np.ndarray:
     """R'G'B' [..., 3] in [0, 1] of Y, Cb, Cr, by the standards' formulas."""
     red, blue = WEIGHTS[matrix]
-    step, top = 2 ** (bits - 8), 2**bits - 1
-    scale, low, chroma = (top, 0, top) if full else (219 * step, 16 * step, 224 * step)
-    luma = (y - float(low)) / scale
-    r = luma + (2 - 2 * red) * (cr - 128.0 * step) / chroma
-    b = luma + (2 - 2 * blue) * (cb - 128.0 * step) / chroma
+    low, range_y, middle, chroma = scales(bits, full)
+    luma = (y - low) / range_y
+    r, b = luma + (2 - 2 * red) * (cr - middle) / chroma, luma + (2 - 2 * blue) * (cb - middle) / chroma
     return np.stack([r, (luma - red * r - blue * b) / (1 - red - blue), b], -1)
 
 
@@ -114,20 +115,11 @@ HDR = [
 ]
 
 
-@pytest.mark.parametrize("codec", ["libx265", "libx264"])
-def test_hdr_of_ten_bits_shows_known_patches_in_known_colours(tmp_path, codec):
-    for transfer in (HLG, PQ):
-        known = [(signal, srgb) for _, kind, signal, srgb in HDR if kind == transfer]
-        path = write(
-            tmp_path / f"{transfer}.mov",
-            [patches([signal for signal, _ in known])] * 4,
-            transfer,
-            REC2020,
-            9,
-            10,
-            codec=codec,
-        )
-        assert np.abs(shown(path) - [srgb for _, srgb in known]).max() < 0.015
+@pytest.mark.parametrize("transfer", [HLG, PQ])
+def test_hdr_of_ten_bits_shows_known_patches_in_known_colours(tmp_path, transfer):
+    signals, srgb = zip(*[(signal, srgb) for _, kind, signal, srgb in HDR if kind == transfer], strict=True)
+    path = write(tmp_path / "hdr.mov", [patches(signals)] * 4, transfer, REC2020, 9, 10)
+    assert np.abs(shown(path) - srgb).max() < 0.015
 
 
 @pytest.mark.parametrize(
@@ -168,10 +160,8 @@ def test_wide_gamut_without_hdr_is_converted(tmp_path):
 @pytest.mark.parametrize("full", [False, True])
 def test_full_and_narrow_range_are_told_apart(tmp_path, full):
     colours = [[0.2] * 3, [0.8] * 3, [0.7, 0.5, 0.4], [0.1, 0.3, 0.2]]
-    assert (
-        np.abs(shown(write(tmp_path / "a.mp4", [patches(colours)] * 3, full=full, codec="libx264")) - colours).max()
-        < 0.012
-    )
+    path = write(tmp_path / "a.mp4", [patches(colours)] * 2, full=full, codec="libx264")
+    assert np.abs(shown(path) - colours).max() < 0.012
 
 
 @pytest.mark.parametrize("size", [(320, 180), (160, 90)], ids=["as it is", "shrunk"])
@@ -235,25 +225,25 @@ def test_a_pause_in_the_recording_takes_no_frames():
 
 def test_what_lies_between_wanted_frames_is_jumped_over(tmp_path, monkeypatch):
     """An hour of video: key frames every second, of which few are needed."""
-    signals = [np.full((64, 64, 3), (i % 200) / 220) for i in range(1200)]
+    signals = [np.full((64, 64, 3), (i % 200) / 220) for i in range(480)]
     path = write(tmp_path / "long.mp4", signals, codec="libx264", g="24", crf="15")
     decoded = []
     decode = video._decode
     monkeypatch.setattr(video, "_decode", lambda *a: (decoded.append(1) or frame for frame in decode(*a)))
-    pictures = read(path, 12)
-    assert [p.index for p in pictures] == np.round(np.linspace(0, 1199, 12)).astype(int).tolist()
+    pictures = read(path, 6)
+    assert [p.index for p in pictures] == np.round(np.linspace(0, 479, 6)).astype(int).tolist()
     assert [p.srgb.mean() for p in pictures] == pytest.approx([p.index % 200 / 220 for p in pictures], abs=0.015)
-    assert len(decoded) < 12 * 25
+    assert len(decoded) < 6 * 25
 
 
-@pytest.mark.parametrize("suffix", ["mts", "m2ts", "mp4", "mkv"])
+@pytest.mark.parametrize("suffix", ["mts", "mp4"])
 def test_a_jump_that_lands_behind_a_frame_is_made_again(tmp_path, suffix):
     """As camcorders record; their transport streams are jumped in by what comes first in the file."""
-    signals = [np.full((64, 64, 3), (i % 200) / 220) for i in range(600)]
+    signals = [np.full((64, 64, 3), (i % 200) / 220) for i in range(300)]
     path = write(tmp_path / f"long.{suffix}", signals, codec="libx264", g="24", crf="15", bf="2")
     report = Reporter("frames")
-    pictures = read(path, 8, report=report)
-    assert [p.index for p in pictures] == np.round(np.linspace(0, 599, 8)).astype(int).tolist()
+    pictures = read(path, 6, report=report)
+    assert [p.index for p in pictures] == np.round(np.linspace(0, 299, 6)).astype(int).tolist()
     assert [p.srgb.mean() for p in pictures] == pytest.approx([p.index % 200 / 220 for p in pictures], abs=0.015)
     assert not report.findings
 
@@ -277,13 +267,29 @@ def test_8k_is_shrunk_before_it_becomes_an_array(tmp_path):
     assert pictures == [(540, 960, 3)] * 2 and peak < 60e6, peak
 
 
-def test_a_shrunk_frame_is_the_mean_of_what_it_covers(tmp_path):
-    signal = np.random.default_rng(0).random((96, 128, 1)).repeat(12, 0).repeat(12, 1).repeat(3, 2)
-    path = write(tmp_path / "big.mp4", [signal] * 2, codec="libx264", full=True)
-    small = read(path, long_side=128)[0].srgb
-    assert small.shape == (96, 128, 3) and np.abs(small - signal[6::12, 6::12]).mean() < 0.01
+def test_a_shrunk_frame_is_the_mean_of_what_it_covers():
+    signal = np.random.default_rng(0).random((24, 32, 1)).repeat(12, 0).repeat(12, 1).repeat(3, 2)
+    small = video._srgb(frame_of(signal, 1, 8, True), (32, 24), 1, REC709)
+    assert small.shape == (24, 32, 3) and np.abs(small - signal[6::12, 6::12]).mean() < 0.01
 
 
 def test_unknown_tags_are_read_as_plain_video():
     signal = np.random.default_rng(1).random((4, 4, 3), np.float32)
     assert to_srgb(signal, 1, REC709) is signal and to_srgb(signal, 13, 2) is signal
+
+
+@pytest.mark.parametrize(
+    ("suffix", "codec"),
+    [
+        (".mp4", "libx264"),
+        (".MOV", "libx265"),
+        (".mkv", "libx264"),
+        (".avi", "mpeg4"),
+        (".webm", "libvpx-vp9"),
+        (".m4v", "mpeg4"),
+    ],
+)
+def test_videos_in_every_container_show_their_frames(place, suffix, codec):
+    levels = [40 * number + 20 for number in range(6)]
+    path = write(place(suffix), [np.full((130, 98, 3), level / 255) for level in levels], codec=codec)
+    assert [255 * picture.srgb.mean() for picture in read(path)] == pytest.approx(levels, abs=6)
