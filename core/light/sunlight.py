@@ -24,13 +24,13 @@ OUTLIER_RANGE_LOG = 3.0  # log units over which an outlier may lie, per channel
 SKY_MEAN = np.array([0, 0, 0.41, 0, 0, 0, -0.11, 0, 0])
 SKY_DEVIATION = np.array([0, 0.44, 0.29, 0.44, 0.40, 0.30, 0.40, 0.30, 0.40])
 """Environments without their sun or lamp: coefficients as shares of the first, mean and deviation of 35 panoramas
-turned about the vertical (python -m research.benchmarks.skies)."""
+turned about the vertical (python -m research.benchmarks.light.skies)."""
 # quadratic form [9, 9] of the prior in the coefficients of an environment of mean radiance one
 _OFF_MEAN = np.eye(9)[1:] - np.outer(SKY_MEAN[1:], np.eye(9)[0])
 _SKY_PRECISION = _OFF_MEAN.T @ np.diag((UNIFORM * SKY_DEVIATION[1:]) ** -2) @ _OFF_MEAN
 INDEPENDENT_SAMPLES = 15
 """Of a face's bare skin, as deviations from its tone reach 16 mm (core/solver/extensions/split.py, python -m
-research.benchmarks.skies)."""
+research.benchmarks.light.skies)."""
 MIN_SUN_GAIN = 0.15  # log likelihood per point required of a sun, or uneven skin passes for a shadow
 DIRECTIONS_AROUND = 12  # tried about the best so far: six on each of two rings
 FINER_DEG = (12.0, 4.0)  # radius of these rings, round by round

@@ -15,8 +15,8 @@ a Gaussian:
 So the split is Gaussian process regression (Rasmussen and Williams 2006, chapter 2). The scales of the four are the
 most probable ones, by the evidence of the texture (ibid., section 5.4) and a prior (TYPICAL_SCALES): where a delighter
 left much light, much of its texture is explained by light. Several captures of a person share the traits but not the
-lights, which separates them far better, local light included. research/benchmarks/split.py measures the constants and
-the outcome.
+lights, which separates them far better, local light included. research/benchmarks/maps/split.py measures the
+constants and the outcome.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ CELLS, FIRST_CELLS = 48, 24
 MIN_CELL_TEXELS = 8  # along a cell's side: a small map has fewer cells
 # distance over which the traits' correlation falls to 1 / e, and the correlation of a place with its mirror image: of
 # painted skins, midway between taking what light is painted into them for traits and taking it out
-# (research/benchmarks/traits.py)
+# (research/benchmarks/maps/traits.py)
 TRAIT_REACH_M, MIRROR_CORRELATION = 0.016, 0.72
 LOCAL_REACH_M, NOISE_REACH_M = 0.020, 0.005
 # axes of a log colour along which the parts are independent: brightness, red against blue, green against both; and

@@ -12,7 +12,6 @@ from torch.nn import functional
 from torch.utils.checkpoint import checkpoint
 
 # of all maps inside the network: channels first takes longer, in convolutions and in this normalisation
-# (research/benchmarks/costs/solver.py)
 MEMORY_FORMAT = torch.channels_last
 STRIP_ROWS = 64  # rows of a map inside the network that are shaped at once, where that can be done in pieces
 

@@ -30,7 +30,7 @@ class Weighing:
 
 
 FITTED = Weighing(share=0.6, doubt=0.15)
-"""For the fitted light: the best over twelve people in sixteen captures (research/benchmarks/delight_answers.py)."""
+"""For the fitted light: the best over twelve people in sixteen captures."""
 
 
 def weigh_in(

@@ -6,7 +6,7 @@ Four errors are taken for independent, so their variances add up: light of the w
 no place is free of; edges of the skin that the frames' registration blurs or moves, the larger the more the albedo
 varies about a texel; a delighter's mistakes on brows, lips, hair and beards; and weak light, which it has to amplify.
 Each was measured on people whose albedo is known, and judged on those who were left out
-(research/benchmarks/confidence.py).
+(research/benchmarks/maps/confidence.py).
 """
 
 from __future__ import annotations

@@ -29,8 +29,8 @@ from .surface import HeadSurface
 
 LEAST_COVER_SHARE, FEWEST_TEXELS = 0.05, 20  # share of hair for a texel to have some, and texels for a part to
 TAPER = 2 / 3  # mean width of a hair over that at its root: tips have a third of it (Strands)
-# coherence of strokes that outweighs the usual direction: `python -m research.benchmarks.groomed FOLDER --trust` chose
-# it on three people
+# coherence of strokes that outweighs the usual direction, chosen on three people by
+# `python -m research.benchmarks.head.groomed FOLDER --trust`
 TRUSTED_COHERENCE = 0.1
 POINTS_PER_HAIR = 6
 WALK_STEPS = 4  # in which half a hair's way is followed
