@@ -118,7 +118,7 @@ def tiny_code(tmp_path_factory):
     from tests.fixtures import tiny_chain
 
     root = tiny_chain.build(tmp_path_factory.mktemp("tiny") / "code")
-    tiny_chain.keep_pace(root)
+    tiny_chain.set_nice(root, 0)
     tiny_chain.compile_once(root)
     return root
 

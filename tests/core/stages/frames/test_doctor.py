@@ -137,7 +137,7 @@ def around(low=-60, high=60, step=3, **other) -> list[FrameRecord]:
         (around(), ""),
         (around(low=0), "left side"),
         (around(high=12), "right side of the face is hardly seen"),
-        (around(low=-12, high=9, step=1), "from in front only"),
+        (around(low=-12, high=9, step=1), "from the front only"),
         ([r for r in around() if not 0 < r.yaw_deg < 40], "Between 0 and 42 degrees"),
         (around(brightness=0.12), "too dark"),
         (around(clipped=0.2), "overexposed: 20% of it"),
@@ -167,7 +167,7 @@ def test_each_shortcoming_has_its_sentence_and_a_good_capture_none(records, word
 def test_a_face_in_blurred_frames_alone_is_told():
     records = [record(face_box=None, yaw_deg=None)] * 39 + [record(blur=0.8)]
     kept = [each for each, out in zip(records, blurred(records), strict=True) if not out]
-    with pytest.raises(Problem, match="only in frames that are blurred"):
+    with pytest.raises(Problem, match="only frames with a face are blurred"):
         diagnose(kept, ["00039.jpg"], False, Reporter("frames"))
 
 
@@ -188,7 +188,7 @@ def test_sides_that_no_face_tells_are_believed_of_a_film_alone(photographs, told
     records = [record(yaw_deg=None, face_box=None)] * 2 + records
     report = Reporter("frames")
     diagnose(records, [], photographs, report)
-    assert ("from in front only" in problems(report)) == told
+    assert ("from the front only" in problems(report)) == told
 
 
 def test_where_no_face_is_found_a_film_is_measured_at_the_last_one_and_a_photograph_at_the_person(monkeypatch):

@@ -187,7 +187,7 @@ def test_the_scan_is_delivered_with_its_colours(capture):
     names = "delivery.json scan.obj scan_lit.png scan_albedo.png scan_albedo_known.png displacement.exr"
     assert {path.name for path in capture.delivery.iterdir()} == set(names.split())
     mesh = meshes.read_obj(capture.delivery / "scan.obj")
-    assert atlas.overlap_share(mesh, 256) < 0.01
+    assert atlas.overlap_share(mesh) < 0.01
     lit, albedo = (images.read_linear(capture.delivery / f"scan_{name}.png") for name in ("lit", "albedo"))
     face, bary = raster.rasterize_uv(mesh, 256)
     points = raster.interpolate(mesh.vertices, mesh.faces, face, bary)
