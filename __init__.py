@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Blender extension's package. Everything is imported when Blender registers it, never before: pytest and the
-worker also see this file, and neither has Blender.
+"""Package of the Blender extension.
+
+Everything is imported when Blender registers it, never before: pytest and the worker also see this file, and neither
+has Blender.
 """
 
 

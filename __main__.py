@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`python FOLDER ...` is `python -m core ...` from any folder: what a farm's task calls, which cannot choose where it
-starts."""
+"""Entry point of `python FOLDER ...`: `python -m core ...` from any folder, for farms whose tasks cannot choose one."""
 
 import sys
 
