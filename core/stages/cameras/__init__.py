@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stage cameras: frames become cameras/, a COLMAP model in the head's world: metres, +Z up, face towards -Y,
-origin midway between the eyes. Solved from what matches between the frames and from the face, or imported from another
-program.
+"""Stage cameras: frames become cameras/, a COLMAP model in the head's world.
+
+Metres, +Z up, face towards -Y, origin midway between the eyes. Solved from matches between the frames and from the
+face, or imported from another program.
 """
 
 from __future__ import annotations
@@ -45,14 +46,17 @@ BLURRED_SHARPNESS_SHARE = 0.6
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Writes capture.cameras. Raises Problem where too few frames fit together, the camera hardly moved, or the head
-    moved on its own; or where imported cameras cannot be read or do not fit the frames."""
+    """Write capture.cameras.
+
+    Raises Problem if too few frames fit together, the camera hardly moved or the head moved on its own, or if imported
+    cameras cannot be read or do not fit the frames.
+    """
     started = time.monotonic()
     frames = read_frames(capture)
-    chosen = settings.cameras.import_from.strip()
+    import_path = settings.cameras.import_from.strip()
     solved = (
-        _imported(Path(chosen).expanduser(), frames, capture, settings, report)
-        if chosen
+        _imported(Path(import_path).expanduser(), frames, capture, settings, report)
+        if import_path
         else solve(frames, capture, settings, report)
     )
     model = solved.model
@@ -88,34 +92,36 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.figure("head_miss_mm", round(1000 * solved.head.unlike_m, 2))
     if solved.swayed:
         report.figure("head_swayed_percent", round(100 * solved.swayed, 1))
-    if chosen:
+    if import_path:
         report.figure("pupils_apart_in_imported_units", round(solved.head.pupils_apart, 5))
     if solved.way == "face":
         report.figure("tracks", solved.tracks)
 
 
 def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
-    """Another program's cameras, checked by the face's landmarks."""
+    """Return another program's cameras, checked by the face's landmarks. Raises Problem if they do not fit."""
     model = import_cameras(path, frames, capture.frames, report)
     names = {image.name for image in model.images.values()}
     records = [record for record in frames.records if record.name in names and record.yaw_deg is not None]
     faces = find_landmarks(coverage.spread_evenly(records, MOST_FACES), capture.frames, report)
     width = float(np.median([face.box[2] - face.box[0] for face in faces.values()] or [1.0]))
 
-    def checked(model) -> tuple[HeadFrame, float]:
-        """The head, and by how many times what is allowed these cameras miss it."""
+    def check_head(model) -> tuple[HeadFrame, float]:
+        """Return the head, and its largest miss in these cameras as a multiple of what is allowed."""
         head = find_head(model, faces, settings.cameras.interpupillary_mm / 1000)
         return head, max(
             head.miss / IMPORT_MISS_SHARE, head.error_px / width / IMPORT_MISS_SHARE, head.unlike_m / IMPORT_UNLIKE_M
         )
 
-    head, off = checked(model)
+    head, off = check_head(model)
     if 1 <= off < IMPORT_NEAR_RATIO and len(frames.records) <= ALL_PAIRS_FRAMES:
         report.log("The imported cameras are a little off; they are refined by what matches in these pictures.")
         matches = solve_structure(frames, capture, False, settings.cameras.matching, settings.seed, report)[1]
-        told = {image.name: model.cameras[image.camera_id].mean_focal_length() for image in model.images.values()}
-        model = refine(model, faces, matches, told, report, agree=WIDE_WIDTH_SHARES + AGREE_WIDTH_SHARES)
-        head, off = checked(model)
+        focal_by_name = {
+            image.name: model.cameras[image.camera_id].mean_focal_length() for image in model.images.values()
+        }
+        model = refine(model, faces, matches, focal_by_name, report, agree=WIDE_WIDTH_SHARES + AGREE_WIDTH_SHARES)
+        head, off = check_head(model)
     if not off < 1:
         raise Problem(
             f"The cameras in {path.name} do not fit these pictures: the face's landmarks miss each other by "
@@ -129,7 +135,7 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
 
 
 def _findings(solved: Solved, records: Sequence[FrameRecord], centres: np.ndarray, report: Reporter) -> None:
-    """What is wrong with a capture that can be used, and how to shoot it again."""
+    """Report what is wrong with a usable capture, and how to shoot it again."""
     shown = {record.name: record.shown for record in records}
     if solved.way == "face" and not solved.every_frame_held and len(records) >= LEAST_VIEWS:
         rough = "refined by what little matches" if solved.refined else "to ten degrees or so"
@@ -149,13 +155,13 @@ def _findings(solved: Solved, records: Sequence[FrameRecord], centres: np.ndarra
             "The head moved against its background during the capture; only what matches on the head itself was used.",
             "Let the person lean the head against a wall or a chair, look at one point, and keep still.",
         )
-    changed = expression_changes(solved.face_by_name)
-    if len(changed) > 0.1 * len(solved.face_by_name):
+    changes = expression_changes(solved.face_by_name)
+    if len(changes) > 0.1 * len(solved.face_by_name):
         report.finding(
-            f"The expression changes: in {len(changed)} of {len(solved.face_by_name)} frames the mouth is opened "
+            f"The expression changes: in {len(changes)} of {len(solved.face_by_name)} frames the mouth is opened "
             "or drawn otherwise than in the rest.",
             "Ask for a relaxed face with closed mouth, without talking, until the end.",
-            [shown[name] for name in changed],
+            [shown[name] for name in changes],
         )
     if solved.mirrored:
         report.finding(

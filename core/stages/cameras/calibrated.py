@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One camera that another program has solved, as its importer reads it.
 
-Inside, as everywhere here: a camera looks along its +z, x to the right, y down; pixel (0.5, 0.5) is the centre of the
-upper left one; lens distortion is OpenCV's (COLMAP's FULL_OPENCV: fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6).
+As everywhere here, a camera looks along its +z, x to the right, y down; pixel (0.5, 0.5) is the centre of the upper
+left one; lens distortion is OpenCV's (COLMAP's FULL_OPENCV: fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6).
 """
 
 from __future__ import annotations
@@ -22,10 +22,12 @@ PIXELS = {"SIMPLE_PINHOLE": 3, "PINHOLE": 4, "SIMPLE_RADIAL": 3, "RADIAL": 3, "O
 
 @dataclass(frozen=True)
 class Calibrated:
-    """One camera. name: of its picture or of the camera itself; frame: number of the video's frame, or None; model and
-    params: COLMAP's, for a picture of width x height pixels, or, where these are 0, with lengths as shares of the
-    picture's longer side counted from its middle; rotation [3, 3] and translation [3] take points of the program's
-    world into the camera."""
+    """One camera as another program solved it.
+
+    name: of its picture or of the camera itself; frame: number of the video's frame, or None; model and params:
+    COLMAP's, for a picture of width x height pixels, or, if these are 0, with lengths as shares of the picture's longer
+    side from its middle; rotation [3, 3] and translation [3]: from the program's world into the camera.
+    """
 
     name: str
     frame: int | None
@@ -37,18 +39,9 @@ class Calibrated:
     translation: np.ndarray
 
     def make_camera(self, number: int, width: int, height: int, picture: str = "") -> pycolmap.Camera:
-        """COLMAP's camera for a picture of another size.
+        """Return COLMAP's camera `number` for a picture of another size in pixels.
 
-        Parameters
-        ----------
-        number : the camera's in the model
-        width, height : of the picture, in pixels
-        picture : its name, for the Problem
-
-        Raises
-        ------
-        Problem
-            Where its shape is not the calibration's.
+        Raises Problem, which names the `picture`, if its shape is not the calibration's.
         """
         params = np.array(self.params, float)
         lengths = PIXELS[self.model]
@@ -74,8 +67,10 @@ class Calibrated:
 
 
 def rigid(matrix: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Camera-to-world [4, 4], any uniform scale in its axes taken out -> rotation [3, 3] and translation [3] into the
-    camera. Raises Problem."""
+    """Return rotation [3, 3] and translation [3] into the camera from its camera-to-world matrix [4, 4].
+
+    A uniform scale of its axes is removed. Raises Problem for any other.
+    """
     size = np.linalg.norm(matrix[:3, :3], axis=0)
     if not (np.isfinite(matrix).all() and size.min() > 0 and size.max() / size.min() < 1.001):
         raise Problem(
@@ -87,7 +82,7 @@ def rigid(matrix: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def trailing_number(name: str) -> int | None:
-    """The number a name ends with, without its ending: frame_0012.png -> 12."""
+    """Return the number at the end of a name without its extension: frame_0012.png -> 12."""
     stem = PurePath(name.replace("\\", "/")).stem
     digits = stem[len(stem.rstrip("0123456789")) :]
     return int(digits) if 0 < len(digits) < 19 else None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From where the face was seen, and which sides are missing, in words an artist understands."""
+"""Sides from which the face was filmed, and those that are missing, in an artist's words."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 SIDE_DEG = 35.0
-"""A side counts as not seen where no camera stands so far round on it; the ears come into view at about twice that."""
+"""A side is missing if no camera stands so far round on it; the ears come into view at about twice that."""
 WANTED_DEG = 60.0
 GAP_DEG = 30.0
 """Wider steps between neighbouring cameras than this leave holes and tear matching."""
@@ -17,7 +17,7 @@ LEVEL_DEG = 5.0  # range of the cameras' heights below which all count as level
 
 
 def spread_evenly(members: Sequence, most: int) -> list:
-    """At most that many of them, the first and the last among them."""
+    """Return at most `most` of the members, evenly spread, the first and the last among them."""
     return (
         [members[i] for i in np.unique(np.linspace(0, len(members) - 1, min(most, len(members))).round().astype(int))]
         if members
@@ -26,21 +26,22 @@ def spread_evenly(members: Sequence, most: int) -> list:
 
 
 def angles(centres: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Camera centres [N, 3] in the head's world -> azimuth [N], 0 in front, positive on the person's left, and
-    elevation [N], in degrees."""
+    """Return azimuth [N] and elevation [N] of camera centres [N, 3] in the head's world, in degrees.
+
+    Azimuth is 0 in front, positive on the person's left.
+    """
     x, y, z = centres.T
     return np.degrees(np.arctan2(x, -y)), np.degrees(np.arctan2(z, np.hypot(x, y)))
 
 
 def widest_deg(centres: np.ndarray) -> float:
-    """The widest angle between two cameras [N, 3] as seen from the head (the origin)."""
+    """Return the widest angle between two camera centres [N, 3] around the head (the origin), in degrees."""
     directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
     return float(np.degrees(np.arccos(np.clip(directions @ directions.T, -1, 1)).max()))
 
 
 def missing(centres: np.ndarray) -> list[tuple[str, str]]:
-    """What was not seen: (problem, remedy) for each side without cameras, for gaps between them, and for one height
-    only."""
+    """Return (problem, remedy) for each side without cameras, for gaps between them, and for a single height."""
     azimuth, elevation = angles(centres)
     azimuth = np.sort(azimuth)
     findings = []

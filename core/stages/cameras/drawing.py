@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A picture of the solved cameras: the most frontal frame with the head's axes, beside a plan of cameras and points
-from above."""
+"""Picture of the solved cameras: the most frontal frame with the head's axes, beside a plan from above."""
 
 from __future__ import annotations
 
@@ -22,19 +21,7 @@ AXES = (((1.0, 0.2, 0.2), (0.1, 0, 0)), ((0.2, 0.9, 0.2), (0, -0.1, 0)), ((0.3, 
 def draw_cameras(
     model: pycolmap.Reconstruction, records: Sequence[FrameRecord], folder: Path, height: int = 480
 ) -> np.ndarray:
-    """The world's axes in the frame that shows the face most from the front, and all cameras from above.
-
-    Parameters
-    ----------
-    model : the cameras, in the capture's world
-    records : of the frames
-    folder : that holds them
-    height : of the picture, in pixels
-
-    Returns
-    -------
-    [height, W, 3], sRGB in [0, 1].
-    """
+    """Draw the world's axes in the most frontal frame, and all cameras from above: sRGB [height, W, 3] in [0, 1]."""
     yaw = {record.name: abs(record.yaw_deg) if record.yaw_deg is not None else 999 for record in records}
     image = min(
         (image for image in model.images.values() if image.has_pose), key=lambda image: yaw.get(image.name, 999)
@@ -57,7 +44,7 @@ def _axes(model: pycolmap.Reconstruction, image: pycolmap.Image, folder: Path, h
 
 
 def _plan(model: pycolmap.Reconstruction, size: int) -> np.ndarray:
-    """From above: the person's left at the right, the face downwards."""
+    """Draw the cameras from above: the person's left at the right, the face downwards."""
     centres = np.array([image.projection_center() for image in model.images.values() if image.has_pose])
     reach = 1.3 * np.abs(centres[:, :2]).max()
     plan = np.ones((size, size, 3), np.float32)

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Face landmarks: in the frames, on the template as a head of its identity space, and what lies between, a similarity.
+"""Face landmarks: in the frames, on the template as a head of its identity space, and the similarity between.
 
-All 432 trusted landmarks have their say on scale and upright, not the corners of the eyes alone, which a net puts
-elsewhere when lids are closed. Umeyama, Least-squares Estimation of Transformation Parameters (1991).
+All 432 trusted landmarks determine scale and upright, not the corners of the eyes alone, which a net misplaces when
+lids are closed. Umeyama, Least-squares Estimation of Transformation Parameters (1991).
 """
 
 from __future__ import annotations
@@ -23,32 +23,21 @@ from ...imaging import images
 LEFT_LIDS, RIGHT_LIDS = faces.EYE_LINES
 PUPILS_PER_LIDS = 63.0 / 62.156 / 1.019
 """The template's pupils are 63 mm apart, the middles of its lids' outlines a little less; and the head that fits a
-net's landmarks came out 1.9 % too large over six synthetic heads of known size (research/benchmarks/head_scale.py)."""
+net's landmarks came out 1.9 % too large over six synthetic heads of known size."""
 
 
 def find_landmarks(
     records: Sequence[FrameRecord], folder: Path, report: Reporter, text: str = "finding the face"
 ) -> dict[str, faces.Face]:
-    """The face in each frame where one is found.
+    """Detect the face in each frame of a folder and return name -> face, without the frames that show none.
 
-    A turned head is followed from the frame before and the one after it, which are near in a film: in a photograph that
-    is only done where no face is found otherwise.
-
-    Parameters
-    ----------
-    records : of the frames
-    folder : that holds them
-    report : hears of progress
-    text : for that
-
-    Returns
-    -------
-    Name -> face.
+    A turned head is tracked from the frame before and the one after, which are near in a film; in photographs only if
+    no face is detected otherwise.
     """
     face_by_name: dict[str, faces.Face] = {}
     last = None
-    for done, record in enumerate(records):
-        report.progress(done, len(records), text)
+    for index, record in enumerate(records):
+        report.progress(index, len(records), text)
         srgb = images.read_srgb(folder / record.name)
         face = faces.detect(srgb, last if record.time_s is not None else None)
         if face is None and last is not None and record.time_s is None:
@@ -68,22 +57,12 @@ def find_landmarks(
 def fit_rays(
     origins: np.ndarray, directions: np.ndarray, points: np.ndarray, rounds: int = 20
 ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-    """The template's head laid against landmarks seen along rays.
+    """Fit the template's head to landmarks along rays.
 
-    Measured across the rays: a net's landmarks slide as the head turns, so that the depths at which they intersect are
-    exaggerated. Gauss-Newton; outliers are weighted down by their distance (Geman-McClure).
-
-    Parameters
-    ----------
-    origins : [N, 3], of the views
-    directions : [N, 468, 3], unit
-    points : [468, 3], roughly where the landmarks lie
-    rounds : of Gauss-Newton
-
-    Returns
-    -------
-    Scale, rotation [3, 3] and translation [3] from the head's metres into the world of the rays, and identity
-    coefficients [K] with prior N(0, 1).
+    origins: [N, 3]; directions: [N, 468, 3], unit; points: [468, 3], roughly the landmarks' places. Returns scale,
+    rotation [3, 3] and translation [3] from the head's metres into the rays' world, and identity coefficients [K],
+    prior N(0, 1). Measured across the rays: a net's landmarks slide as the head turns, so that the depths at which they
+    intersect are exaggerated. Gauss-Newton; outliers are weighted down by their distance (Geman-McClure).
     """
     model = template_landmarks()
     across = np.eye(3) - directions[..., :, None] * directions[..., None, :]  # [N, 468, 3, 3]
@@ -116,14 +95,16 @@ def fit_rays(
 
 
 def robust_weights(miss_m: np.ndarray, trust: np.ndarray) -> np.ndarray:
-    """Weights [N, 468] of landmarks that miss by so much [N, 468], in 1 / m^2: INDEPENDENT_LANDMARKS of them in all
-    count."""
+    """Return weights [N, 468] in 1 / m^2 of landmarks from their misses [N, 468].
+
+    They add up to INDEPENDENT_LANDMARKS landmarks.
+    """
     weights = trust / (1 + (miss_m / (2.5 * np.maximum(np.median(miss_m, axis=1, keepdims=True), 1e-4))) ** 2) ** 2
     return weights * INDEPENDENT_LANDMARKS / weights.sum() / SIGMA_M**2
 
 
 def pupils(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The right and the left pupil [3] of the template's head with these coefficients, in its metres."""
+    """Return the right and the left pupil [3] of the template's head with these coefficients, in its metres."""
     shape = template_landmarks().shape(coefficients)
     right, left = shape[list(RIGHT_LIDS)].mean(0), shape[list(LEFT_LIDS)].mean(0)
     middle, half = (right + left) / 2, PUPILS_PER_LIDS * (left - right) / 2
@@ -131,7 +112,7 @@ def pupils(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def similarity(source: np.ndarray, target: np.ndarray, weights: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """scale, rotation [3, 3], translation [3] that take source [N, 3] to target in the weighted least-squares sense."""
+    """Return scale, rotation [3, 3], translation [3] from source [N, 3] to target, by weighted least squares."""
     weights = weights / weights.sum()
     a, b = source - weights @ source, target - weights @ target
     u, s, vt = np.linalg.svd((b * weights[:, None]).T @ a)

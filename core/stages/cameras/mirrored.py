@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mirrored pictures among others: one whose mirror image matches the others where it does not itself. A set that is
-mirrored as a whole cannot be told from its geometry. Lowe, Distinctive Image Features (2004); Arandjelovic and
-Zisserman's RootSIFT (2012).
+"""Detection of mirrored pictures: those whose mirror image matches the others better than they do.
+
+A set that is mirrored as a whole cannot be recognised by its geometry. Lowe, Distinctive Image Features (2004);
+Arandjelovic and Zisserman's RootSIFT (2012).
 """
 
 from __future__ import annotations
@@ -20,12 +21,11 @@ from ...imaging import images
 
 LONG_SIDE_PX = 640
 MOST_FEATURES = 1500
-"""Size of the pictures that are compared, and the features of each: it is asked only whether two match as they are or
-mirrored."""
+"""Size of the compared pictures, and features of each: enough to decide whether two match as they are or mirrored."""
 LEAST_MATCHES = 20
 """Matches on one epipolar geometry that two views of one scene have at least."""
 MOST_PAIRS = 60
-"""That are compared, spread over all."""
+"""Compared pairs, spread over all."""
 
 
 def find_mirrored(
@@ -35,45 +35,38 @@ def find_mirrored(
     report: Reporter,
     face_by_name: Mapping[str, faces.Face] = MappingProxyType({}),
 ) -> list[str]:
-    """Those pictures that are mirrored with respect to others.
+    """Return the names of suspects in a folder that are mirrored with respect to others.
 
-    Of two pictures that show a face from its two sides, one flipped looks like the other whatever is true, for faces
-    are symmetric: there only what lies beside the face counts.
-
-    Parameters
-    ----------
-    suspects : names of the pictures
-    trusted : names of pictures that are not; where there are none, most of the suspects
-    folder : that holds them
-    report : hears of progress
-    face_by_name : the face in each that shows one
+    trusted: names of pictures that are not mirrored; without any, most of the suspects are trusted. Two pictures of a
+    face from opposite sides match when one is flipped, mirrored or not, because faces are symmetric: for those only
+    what lies beside the face counts.
     """
     among_suspects = [(a, b) for i, a in enumerate(suspects) for b in suspects[i + 1 :]]
     pairs = [(a, b) for a in suspects for b in trusted] or among_suspects
     if len(pairs) > MOST_PAIRS:
         pairs = [pairs[i] for i in np.linspace(0, len(pairs) - 1, MOST_PAIRS).round().astype(int)]
-    described: dict[tuple, tuple] = {}
+    features_by_name: dict[tuple, tuple] = {}
     sizes: dict[str, tuple[int, int]] = {}
 
     def features(name: str, flip: bool) -> tuple:
-        if (name, flip) not in described:
+        if (name, flip) not in features_by_name:
             picture = images.read_srgb(folder / name)
             sizes[name] = picture.shape[1], picture.shape[0]
-            described[name, flip] = _describe(picture, flip)
-        return described[name, flip]
+            features_by_name[name, flip] = _describe(picture, flip)
+        return features_by_name[name, flip]
 
     relation: dict[tuple[str, str], int] = {}
-    for done, (a, b) in enumerate(pairs):
-        report.progress(done, len(pairs), "looking for mirrored pictures")
+    for index, (a, b) in enumerate(pairs):
+        report.progress(index, len(pairs), "looking for mirrored pictures")
         yaws = [face_by_name[name].yaw_deg for name in (a, b) if name in face_by_name]
         opposite = len(yaws) == 2 and abs(yaws[0] + yaws[1]) < abs(yaws[0] - yaws[1])
         plain, flipped = (
             _agreeing(
                 *(
-                    _beside(features(name, turned), face_by_name[name], turned, sizes[name])
+                    _beside(features(name, mirror), face_by_name[name], mirror, sizes[name])
                     if opposite
-                    else features(name, turned)
-                    for name, turned in ((a, flip), (b, False))
+                    else features(name, mirror)
+                    for name, mirror in ((a, flip), (b, False))
                 )
             )
             for flip in (False, True)
@@ -84,26 +77,25 @@ def find_mirrored(
 
 
 def _minority(relation: dict[tuple[str, str], int], suspects: list[str], trusted: list[str]) -> list[str]:
-    """Names that stand to the trusted ones, or to the larger part, as a mirror image does."""
+    """Return suspects that are mirrored with respect to the trusted pictures, or to the majority."""
     side = dict.fromkeys(trusted, 1)
     if not side and relation:
         side[max(suspects, key=lambda name: sum(name in pair for pair in relation))] = 1
     while True:
-        known = {
+        sides = {
             a if b in side else b: sign * side[b if b in side else a]
             for (a, b), sign in relation.items()
             if (a in side) != (b in side)
         }
-        if not known:
+        if not sides:
             break
-        side |= known
+        side |= sides
     less = -1 if trusted or sum(s < 0 for s in side.values()) <= len(side) / 2 else 1
     return sorted(name for name in suspects if side.get(name) == less)
 
 
 def _beside(features: tuple, face: faces.Face, flip: bool, size: tuple[int, int]) -> tuple:
-    """Those of a picture's features that do not lie on the head; size: width and height of the picture that the face
-    was found in."""
+    """Return a picture's features off the head; size: width and height of the picture with the detected face."""
     points, descriptors = features
     x0, y0, x1, y1 = face.box
     w, h = x1 - x0, y1 - y0
@@ -118,7 +110,7 @@ def _beside(features: tuple, face: faces.Face, flip: bool, size: tuple[int, int]
 
 
 def _describe(srgb: np.ndarray, flip: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Keypoints [K, 2] and RootSIFT descriptors [K, 128] of a picture, mirrored first where `flip`."""
+    """Return keypoints [K, 2] and RootSIFT descriptors [K, 128] of a picture, mirrored first if `flip`."""
     scale = min(1.0, LONG_SIDE_PX / max(srgb.shape[:2]))
     grey = images.resize(
         srgb @ np.array([0.299, 0.587, 0.114], np.float32), round(srgb.shape[1] * scale), round(srgb.shape[0] * scale)
@@ -127,12 +119,12 @@ def _describe(srgb: np.ndarray, flip: bool) -> tuple[np.ndarray, np.ndarray]:
     points, descriptors = cv2.SIFT_create(MOST_FEATURES, contrastThreshold=0.02).detectAndCompute(grey, None)
     if descriptors is None:
         return np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32)
-    described = np.sqrt(descriptors / np.maximum(descriptors.sum(1, keepdims=True), 1e-9))
-    return np.array([point.pt for point in points], np.float32), described
+    root_sift = np.sqrt(descriptors / np.maximum(descriptors.sum(1, keepdims=True), 1e-9))
+    return np.array([point.pt for point in points], np.float32), root_sift
 
 
 def _agreeing(a: tuple, b: tuple) -> int:
-    """How many matches between two pictures lie on one epipolar geometry."""
+    """Count the matches between two pictures that lie on one epipolar geometry."""
     if min(len(a[0]), len(b[0])) < LEAST_MATCHES:
         return 0
     matches = [

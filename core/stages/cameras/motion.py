@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the person kept still: what face and background tell of the motion between two frames, and whether the
-expression changed.
+"""Motion of the head: against its background between two frames, and changes of expression.
 
 Matches are COLMAP's before it chose one motion, so both motions are in them.
 """
@@ -24,7 +23,7 @@ TURNED_DEG = 12.0
 STILL_DIAGONAL_SHARE = 0.004
 """Share of the picture's diagonal by which a background may drift in a picture of a camera on a tripod."""
 LEAST_MATCHES = 20
-"""Background matches that say something of a pair."""
+"""Background matches that a pair needs to count."""
 MOUTH, CORNERS, EYES = (13, 14), (61, 291), (33, 263)
 OPENED_SHARE, SMILED_SHARE = 0.12, 0.15
 """Changes of the mouth's opening and width, as shares of the distance of the eyes' outer corners, that a net's noise
@@ -32,9 +31,11 @@ does not make."""
 
 
 def camera_stood_still(matches: Matches, face_by_name: dict[str, faces.Face]) -> bool | None:
-    """True where the background stays put while the head turns, False where it does not; None where too few pairs
-    tell."""
-    stayed = []
+    """Return True if the background stays in place while the head turns, False if it does not.
+
+    None if there are too few pairs to decide.
+    """
+    votes = []
     for (first, second), _ in matches.pairs.items():
         if (
             first not in face_by_name
@@ -46,12 +47,12 @@ def camera_stood_still(matches: Matches, face_by_name: dict[str, faces.Face]) ->
         behind = in_background(a, face_by_name[first]) & in_background(b, face_by_name[second])
         if behind.sum() >= LEAST_MATCHES:
             reach = STILL_DIAGONAL_SHARE * np.linalg.norm(np.concatenate([a, b]).max(0))
-            stayed.append(np.median(np.linalg.norm(a[behind] - b[behind], axis=1)) < reach)
-    return bool(np.mean(stayed) > 0.6) if len(stayed) >= 2 else None
+            votes.append(np.median(np.linalg.norm(a[behind] - b[behind], axis=1)) < reach)
+    return bool(np.mean(votes) > 0.6) if len(votes) >= 2 else None
 
 
 def in_background(pixels: np.ndarray, face: faces.Face) -> np.ndarray:
-    """Which pixels [N, 2] lie beside or above the head [N]: not on face, hair, neck or shoulders."""
+    """Return a mask [N] of pixels [N, 2] beside or above the head: not on face, hair, neck or shoulders."""
     x0, y0, x1, y1 = face.box
     aside = np.abs(pixels[:, 0] - (x0 + x1) / 2) > 1.3 * (x1 - x0)
     return (aside & (pixels[:, 1] < y1)) | (pixels[:, 1] < y0 - 0.7 * (y1 - y0))
@@ -60,19 +61,12 @@ def in_background(pixels: np.ndarray, face: faces.Face) -> np.ndarray:
 def head_masks(
     face_by_name: dict[str, faces.Face], records: Sequence[FrameRecord], folder: Path, out: Path, report: Reporter
 ) -> None:
-    """Writes NAME.png for each frame: white on the head, black elsewhere (all black without a face). A turning head
-    leaves its shoulders behind.
+    """Write NAME.png into `out` for each frame of a folder: white on the head, black elsewhere.
 
-    Parameters
-    ----------
-    face_by_name : the face in each frame that shows one
-    records : of the frames
-    folder : that holds them
-    out : that takes the masks
-    report : hears of progress
+    A frame without a face is all black. Shoulders are left out, because a turning head leaves them behind.
     """
-    for done, record in enumerate(records):
-        report.progress(done, len(records), "masking the head")
+    for index, record in enumerate(records):
+        report.progress(index, len(records), "masking the head")
         width, height = images.size(folder / record.name)
         mask = np.zeros((height, width), np.float32)
         if record.name in face_by_name:
@@ -96,7 +90,7 @@ def head_masks(
 
 
 def expression_changes(face_by_name: dict[str, faces.Face]) -> list[str]:
-    """Names of the frames whose mouth is opened or widened unlike in most; profiles are not asked."""
+    """Return names of frames whose mouth is opened or widened unlike in most; profiles are skipped."""
     names = [name for name, face in face_by_name.items() if abs(face.yaw_deg) < 30]
     if len(names) < 3:
         return []
@@ -107,7 +101,7 @@ def expression_changes(face_by_name: dict[str, faces.Face]) -> list[str]:
         ]
     )
     off = np.abs(shape - np.median(shape, 0)) > (OPENED_SHARE, SMILED_SHARE)
-    return [name for name, changed in zip(names, off.any(1), strict=True) if changed]
+    return [name for name, change in zip(names, off.any(1), strict=True) if change]
 
 
 def _apart(face: faces.Face, pair: tuple[int, int]) -> float:

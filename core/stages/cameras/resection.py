@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The second way in, where frames do not match: cameras from the face's landmarks and the template's head, by PnP and
-bundle adjustment.
+"""Cameras from the face's landmarks and the template's head, for frames that do not match.
 
-Feature matches that agree with these first cameras then refine them, and bring in frames where no face is found (full
-profiles).
+By PnP and bundle adjustment. Feature matches that agree with these first cameras then refine them, and add frames
+without a detected face (full profiles).
 """
 
 from __future__ import annotations
@@ -26,18 +25,21 @@ AGREE_WIDTH_SHARES = (0.05, 0.025, 0.0125)
 """Shares of the face's width by which matches may miss, round by round, as the cameras get better."""
 MOST_TRACKS = 5000
 ENOUGH_TRACKS = 30
-"""Tracks that a frame is seen in where they hold its camera better than the face does."""
+"""Tracks in a frame from which they hold its camera better than the face does."""
 AGREED_SHARE = 0.5
 LEAST_ANGLE_DEG = 2.0
 LEAST_MATCHES = 12
-"""Points by which a frame without a face is placed."""
+"""Minimum points to place a frame without a face."""
 
 
 @dataclass(frozen=True)
 class Resection:
-    """A model in the head's world (metres); landmark_px, how far the landmarks miss [median px], and that as a share of
-    the face's width; the number of tracks that refined it, whether they are enough to trust it, the names of frames
-    that came in through matches alone, and the identity coefficients [K] of the head."""
+    """A model in the head's world (metres).
+
+    landmark_px: the landmarks' median miss, in pixels; landmark_miss: the same as a share of the face's width; tracks,
+    refined: how many refined it, and whether they are enough to trust it; by_matches: names of the frames placed by
+    matches alone; coefficients: the head's identity [K].
+    """
 
     model: pycolmap.Reconstruction
     landmark_px: float
@@ -51,18 +53,10 @@ class Resection:
 def resect(
     groups: list[dict], face_by_name: dict[str, faces.Face], matches: Matches, report: Reporter
 ) -> Resection | None:
-    """Cameras of the frames with a face, and of those that match them.
+    """Return cameras of the frames with a face, and of those that match them.
 
-    Parameters
-    ----------
-    groups : [{names, width, height, focal_px or null}], of one camera each
-    face_by_name : the face in each frame that shows one
-    matches : between the frames
-    report : hears of progress
-
-    Returns
-    -------
-    None where no frame shows a face, or one of several.
+    groups: [{names, width, height, focal_px or null}], of one camera each. None if no frame, or only one of several,
+    shows a face.
     """
     group_of = {name: number for number, group in enumerate(groups) for name in group["names"]}
     names = sorted(name for name in face_by_name if name in group_of)
@@ -80,18 +74,18 @@ def resect(
         np.concatenate([pixels[n] for n in names]),
     )
     bundle = adjust(bundle, landmarks)
-    seen, used = landmarks, []
+    observations, used = landmarks, []
     for step, share in enumerate(AGREE_WIDTH_SHARES, 1):
         report.progress(step, 5, "refining cameras by what matches")
-        added, used, bundle = agreeing(bundle, names, matches, share * width)
-        parts = zip((landmarks.camera, landmarks.point, landmarks.pixel), added, strict=True)
-        seen = Observations(*(np.concatenate([a, b]) for a, b in parts))
-        bundle = adjust(bundle, seen, 10)
+        track_observations, used, bundle = agreeing(bundle, names, matches, share * width)
+        parts = zip((landmarks.camera, landmarks.point, landmarks.pixel), track_observations, strict=True)
+        observations = Observations(*(np.concatenate([a, b]) for a, b in parts))
+        bundle = adjust(bundle, observations, 10)
     late = place_by_matches(bundle, groups, group_of, names, used, matches)
     miss = np.linalg.norm(bundle.project(landmarks.camera, landmarks.point) - landmarks.pixel, axis=1)
     error = float(np.median(miss[model.trust[landmarks.point] > 0.2]))
     return Resection(
-        _model(bundle, groups, group_of, names, seen, late),
+        _model(bundle, groups, group_of, names, observations, late),
         error,
         error / width,
         len(used),
@@ -102,8 +96,10 @@ def resect(
 
 
 def _trusted(names: list[str], matches: Matches, used: list) -> bool:
-    """Whether every frame is held by tracks, and they are a good part of all that matches: chance agreements are few
-    among many."""
+    """Return whether tracks hold every frame and are a good part of all matches.
+
+    Chance agreements are few among many.
+    """
     track_counts = Counter(name for track in used for name, _ in track)
     track_of = {member: number for number, track in enumerate(used) for member in track}
     pairs = [(a, b, index) for (a, b), index in matches.pairs.items() if a in names and b in names]
@@ -112,18 +108,10 @@ def _trusted(names: list[str], matches: Matches, used: list) -> bool:
 
 
 def agreeing(bundle: Bundle, names: list[str], matches: Matches, reach_px: float) -> tuple[tuple, list, Bundle]:
-    """Tracks whose triangulated point projects near its keypoints in two frames or more.
+    """Return tracks whose triangulated point projects within reach_px of its keypoints in two frames or more.
 
-    Parameters
-    ----------
-    bundle : of the frames
-    names : of the frames, in the bundle's order
-    matches : between them
-    reach_px : that a point may miss by
-
-    Returns
-    -------
-    Their observations, themselves, and the bundle with the points.
+    names: in the bundle's order. First the observations (camera, point, pixel), then the tracks, then the bundle with
+    their points.
     """
     number = {name: i for i, name in enumerate(names)}
     points, used, camera, point, pixel = [], [], [], [], []
@@ -151,7 +139,7 @@ def agreeing(bundle: Bundle, names: list[str], matches: Matches, reach_px: float
 
 
 def _epipolar(bundle: Bundle, number: dict, matches: Matches, reach_px: float) -> Matches:
-    """The matches that come near each other's epipolar lines."""
+    """Return the matches within reach_px of each other's epipolar lines."""
     keep = {}
     for first, second in matches.pairs:
         i, j = number[first], number[second]
@@ -176,7 +164,7 @@ def _epipolar(bundle: Bundle, number: dict, matches: Matches, reach_px: float) -
 
 
 def _triangulate(bundle: Bundle, camera: np.ndarray, pixel: np.ndarray) -> np.ndarray | None:
-    """The point nearest to all rays [3]; None where they are nearly parallel."""
+    """Return the point [3] nearest to all rays; None if they are nearly parallel."""
     plane = (pixel - bundle.centre[camera]) / bundle.focal[bundle.lens[camera], None]
     rays = np.einsum("mji,mj->mi", bundle.rotations[camera], np.concatenate([plane, np.ones((len(plane), 1))], 1))
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
@@ -190,20 +178,10 @@ def _triangulate(bundle: Bundle, camera: np.ndarray, pixel: np.ndarray) -> np.nd
 def place_by_matches(
     bundle: Bundle, groups: list[dict], group_of: dict, names: list[str], used: list, matches: Matches
 ) -> dict[str, tuple]:
-    """Frames without a face, placed by PnP on the tracks' points that their keypoints match.
+    """Place frames without a face by PnP on the tracks' points that match their keypoints.
 
-    Parameters
-    ----------
-    bundle : of the frames with a face, and the tracks' points
-    groups : of one camera each
-    group_of : the group's number of each frame
-    names : of the frames with a face
-    used : the tracks, in the order of the bundle's points
-    matches : between all frames
-
-    Returns
-    -------
-    Name -> rotation, translation.
+    names: the frames with a face; used: the tracks, in the order of the bundle's points. Returns name -> rotation
+    [3, 3], translation [3].
     """
     marks = len(template_landmarks().mean)
     place = {member: bundle.points[marks + i] for i, track in enumerate(used) for member in track}
@@ -248,7 +226,7 @@ def _model(
     observations: Observations,
     late: dict[str, tuple],
 ) -> pycolmap.Reconstruction:
-    """As COLMAP writes it: cameras, images, and as points the landmarks and tracks."""
+    """Return COLMAP's model: cameras, images, and as points the landmarks and tracks."""
     model = pycolmap.Reconstruction()
     for number, group in enumerate(groups):
         width, height = group["width"], group["height"]

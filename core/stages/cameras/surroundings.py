@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether all but the head stays put while the head turns: seen in a few pictures, before minutes go into features that
-would say so."""
+"""Test whether everything but the head stays in place while the head turns.
+
+A few pictures show it, before minutes are spent on features that would.
+"""
 
 from __future__ import annotations
 
@@ -28,9 +30,11 @@ motion, and every frame has the whole of it."""
 
 
 def surroundings_stay(face_by_name: dict[str, faces.Face], folder: Path) -> bool:
-    """Whether what is not the head (wall, shoulders, clothes) stays where it is between pictures in which the head has
-    turned. False where a bare wall and what else there is do not tell."""
-    names, stayed = sorted(face_by_name), []
+    """Return whether wall, shoulders and clothes stay in place between pictures in which the head has turned.
+
+    False if there is too little to decide by, such as a bare wall.
+    """
+    names, votes = sorted(face_by_name), []
     small = {name: _read(folder / name) for name in names}
     for i, first in enumerate(names):
         face = face_by_name[first]
@@ -38,18 +42,18 @@ def surroundings_stay(face_by_name: dict[str, faces.Face], folder: Path) -> bool
             (name for name in names[i + 1 :] if abs(face_by_name[name].yaw_deg - face.yaw_deg) >= TURNED_DEG), None
         )
         share = None if second is None else _share_that_stays(small[first], small[second], face, face_by_name[second])
-        stayed += [] if share is None else [share > 0.6]
-    return len(stayed) >= 2 and bool(np.mean(stayed) > 0.6)
+        votes += [] if share is None else [share > 0.6]
+    return len(votes) >= 2 and bool(np.mean(votes) > 0.6)
 
 
 def spread_over(records: Sequence[FrameRecord]) -> tuple[FrameRecord, ...]:
-    """MOST_FRAMES of a film's frames, evenly spread, and beside them those that the texture is made from."""
+    """Return MOST_FRAMES of a film's frames, evenly spread, and those that the texture is made from."""
     even = set(spread_evenly(range(len(records)), MOST_FRAMES))
     return tuple(record for i, record in enumerate(records) if i in even or record.selected)
 
 
 def _read(path: Path) -> tuple[np.ndarray, float]:
-    """A picture in grey levels, small, and by how much it was scaled."""
+    """Return a small picture in grey levels and its scale."""
     picture = images.read_srgb(path)
     scale = min(1.0, LONG_SIDE_PX / max(picture.shape[:2]))
     picture = images.resize(picture, round(scale * picture.shape[1]), round(scale * picture.shape[0]))
@@ -57,8 +61,10 @@ def _read(path: Path) -> tuple[np.ndarray, float]:
 
 
 def _share_that_stays(picture: tuple, turned_picture: tuple, face: faces.Face, turned: faces.Face) -> float | None:
-    """Of the corners off both heads in one picture, how many are at the same place in the other; None where there are
-    too few."""
+    """Return the share of corners off both heads that are at the same place in both pictures.
+
+    None if there are too few.
+    """
     (first, scale), (second, _) = picture, turned_picture
     corners = cv2.goodFeaturesToTrack(first, MOST_CORNERS, LEAST_QUALITY_SHARE, 4)
     if corners is None or first.shape != second.shape:
@@ -67,17 +73,17 @@ def _share_that_stays(picture: tuple, turned_picture: tuple, face: faces.Face, t
     off = ~_on_head(at / scale, face) & ~_on_head(at / scale, turned)
     if off.sum() < LEAST_MATCHES:
         return None
-    there, tracked, _ = cv2.calcOpticalFlowPyrLK(first, second, corners[off], None)
-    back, again, _ = cv2.calcOpticalFlowPyrLK(second, first, there, None)
-    moved = np.linalg.norm((there - corners[off]).reshape(-1, 2), axis=1)
-    still = moved < STILL_DIAGONAL_SHARE * np.hypot(*first.shape)
-    returned = np.linalg.norm((back - corners[off]).reshape(-1, 2), axis=1)
-    sure = (tracked.ravel() > 0) & (again.ravel() > 0) & (returned < 1)
+    there, forward_status, _ = cv2.calcOpticalFlowPyrLK(first, second, corners[off], None)
+    back, back_status, _ = cv2.calcOpticalFlowPyrLK(second, first, there, None)
+    motion = np.linalg.norm((there - corners[off]).reshape(-1, 2), axis=1)
+    still = motion < STILL_DIAGONAL_SHARE * np.hypot(*first.shape)
+    return_error = np.linalg.norm((back - corners[off]).reshape(-1, 2), axis=1)
+    sure = (forward_status.ravel() > 0) & (back_status.ravel() > 0) & (return_error < 1)
     return float((still & sure).mean())
 
 
 def _on_head(pixels: np.ndarray, face: faces.Face) -> np.ndarray:
-    """Which pixels [N, 2] lie on the head, its hair or its neck [N], roughly."""
+    """Return a mask [N] of pixels [N, 2] that lie on the head, its hair or its neck, roughly."""
     x0, y0, x1, y1 = face.box
     beside = np.abs(pixels[:, 0] - (x0 + x1) / 2) < 1.1 * (x1 - x0)
     return beside & (pixels[:, 1] > y0 - 0.7 * (y1 - y0)) & (pixels[:, 1] < y1 + 0.4 * (y1 - y0))

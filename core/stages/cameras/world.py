@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From any world of cameras to the head's: metres, +Z up, face towards -Y, origin midway between the eyes.
 
-Face landmarks of several frames are rays; the template's head laid against them gives upright and, by its pupils,
-scale.
+Face landmarks of several frames are rays; the template's head fitted to them gives upright and, by its pupils, scale.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ ASTRAY_RATIO, ASTRAY_WIDTH_SHARE = 4.0, 0.1
 """A frame whose landmarks miss those of the others by so many times the usual, and by such a share of the face's width,
 shows a face that the net did not find: a profile, mostly."""
 SURE_SCORE = 0.8
-"""Score of a face that was found; the net gives one that is there 0.95 and more."""
+"""Score above which a face is certain; the net gives a real one 0.95 and more."""
 FRONTAL_DEG = 45.0
 """Landmarks slide along the silhouette of a turned head, so frames within this yaw are taken where there are enough."""
 PUPILS_M = 0.063
@@ -34,9 +33,12 @@ counts as moved."""
 
 @dataclass(frozen=True)
 class HeadFrame:
-    """The similarity into the head's world; by how much the landmarks' rays miss each other [px, median over frames and
-    landmarks], and that as a share of the face's width in the quarter of the frames where it is most; the distance of
-    the pupils in the units of the cameras' own world; by how much the template's head misses the rays [m, median]."""
+    """Similarity into the head's world, and how well the head fits.
+
+    error_px: the landmark rays' miss of each other [px, median over frames and landmarks]; miss: the same as a share of
+    the face's width, at the worst quarter of the frames; pupils_apart: in units of the cameras' own world; unlike_m:
+    the template head's median miss of the rays, in metres.
+    """
 
     world_from_model: pycolmap.Sim3d
     error_px: float
@@ -46,32 +48,34 @@ class HeadFrame:
 
     @property
     def template_from_model(self) -> pycolmap.Sim3d:
-        """The similarity into the template's own world, as the head's but with pupils PUPILS_M apart."""
+        """Similarity into the template's own world: the head's, but with pupils PUPILS_M apart."""
         into = self.world_from_model
         size = PUPILS_M / (into.scale * self.pupils_apart)
         return pycolmap.Sim3d(size * into.scale, into.rotation, size * into.translation)
 
     @property
     def still(self) -> bool:
-        """Whether the head kept still with respect to what the cameras were found from."""
+        """Whether the head kept still with respect to what the cameras were solved from."""
         return self.miss <= MOVED_WIDTH_SHARE
 
 
 def find_head(
     model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face], interpupillary_m: float
 ) -> HeadFrame:
-    """`face_by_name`: name -> face. Raises Problem where fewer than two registered frames show a face."""
-    seen = _registered_with_face(model, face_by_name)
-    if len(seen) < 2:
+    """Return the head in a model. Raises Problem if fewer than two registered frames show a face."""
+    views = _registered_with_face(model, face_by_name)
+    if len(views) < 2:
         raise Problem(
             "The face is seen in fewer than two of the frames whose cameras were found.",
             "Film so that eyes, nose and mouth stay visible in most of the frames.",
         )
-    origins, directions = zip(*(rays(image, model.cameras[image.camera_id], face) for image, face in seen), strict=True)
+    origins, directions = zip(
+        *(rays(image, model.cameras[image.camera_id], face) for image, face in views), strict=True
+    )
     origins, directions = np.array(origins), np.array(directions)
     points, angles = intersect_rays(origins, directions)
-    focal = np.array([model.cameras[image.camera_id].mean_focal_length() for image, _ in seen])
-    width = np.median([face.box[2] - face.box[0] for _, face in seen])
+    focal = np.array([model.cameras[image.camera_id].mean_focal_length() for image, _ in views])
+    width = np.median([face.box[2] - face.box[0] for _, face in views])
     # per frame, so that a head that sat elsewhere in a quarter of them shows
     errors = np.median(angles * focal[:, None], axis=1)
     good = _together(errors, width)
@@ -97,15 +101,10 @@ def find_head(
 
 
 def head_of_one(coefficients: np.ndarray, error_px: float, miss: float, interpupillary_m: float) -> HeadFrame:
-    """The head in the one camera that was placed by it, which is in the template's metres: no rays meet, and its
-    landmarks miss by what the fit says.
+    """Return the head in a single camera that was placed by it, which is in the template's metres.
 
-    Parameters
-    ----------
-    coefficients : [K], of the identity
-    error_px : by which the landmarks miss
-    miss : the same as a share of the face's width
-    interpupillary_m : how far the pupils lie apart
+    No rays meet there, so the miss is that of the fit: error_px, and `miss` as a share of the face's width.
+    coefficients: identity [K].
     """
     right, left = pupils(coefficients)
     apart = float(np.linalg.norm(left - right))
@@ -116,27 +115,29 @@ def head_of_one(coefficients: np.ndarray, error_px: float, miss: float, interpup
 
 
 def agreeing_faces(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face]) -> dict[str, faces.Face]:
-    """Those of the faces found in registered frames whose landmarks meet those of the other frames."""
-    seen = _sure(model, face_by_name)
-    if len(seen) < 3:
-        return {image.name: face for image, face in seen}
-    origins, directions = zip(*(rays(image, model.cameras[image.camera_id], face) for image, face in seen), strict=True)
-    _, angles = intersect_rays(np.array(origins), np.array(directions))
-    focal = np.array([model.cameras[image.camera_id].mean_focal_length() for image, _ in seen])
-    good = _together(
-        np.median(angles * focal[:, None], axis=1), np.median([face.box[2] - face.box[0] for _, face in seen])
+    """Return the faces in registered frames whose landmarks meet those of the other frames."""
+    views = _sure(model, face_by_name)
+    if len(views) < 3:
+        return {image.name: face for image, face in views}
+    origins, directions = zip(
+        *(rays(image, model.cameras[image.camera_id], face) for image, face in views), strict=True
     )
-    return {image.name: face for (image, face), kept in zip(seen, good, strict=True) if kept}
+    _, angles = intersect_rays(np.array(origins), np.array(directions))
+    focal = np.array([model.cameras[image.camera_id].mean_focal_length() for image, _ in views])
+    good = _together(
+        np.median(angles * focal[:, None], axis=1), np.median([face.box[2] - face.box[0] for _, face in views])
+    )
+    return {image.name: face for (image, face), keep in zip(views, good, strict=True) if keep}
 
 
 def _together(errors: np.ndarray, width: float) -> np.ndarray:
-    """bool [N]: frames whose landmarks miss by no more than the others'; errors [N] and the face's width in pixels."""
+    """Return a mask [N] of frames that miss by no more than the others; errors [N] and width in pixels."""
     good = errors <= max(ASTRAY_RATIO * np.median(errors), ASTRAY_WIDTH_SHARE * width)
     return good if good.sum() >= 2 else np.ones(len(errors), bool)
 
 
 def rays(image: pycolmap.Image, camera: pycolmap.Camera, face: faces.Face) -> tuple[np.ndarray, np.ndarray]:
-    """Centre [3] of a registered image and unit directions [468, 3] of its landmarks, in the model's world."""
+    """Return a registered image's centre [3] and unit directions [468, 3] of its landmarks, in the model's world."""
     pose = image.cam_from_world() if callable(image.cam_from_world) else image.cam_from_world
     rotation = pose.rotation.matrix()
     plane = np.asarray(camera.cam_from_img(face.landmarks[:, :2].astype(np.float64)))
@@ -145,8 +146,10 @@ def rays(image: pycolmap.Image, camera: pycolmap.Camera, face: faces.Face) -> tu
 
 
 def intersect_rays(origins: np.ndarray, directions: np.ndarray, rounds: int = 10) -> tuple[np.ndarray, np.ndarray]:
-    """The points [P, 3] nearest to rays from origins [N, 3] along unit directions [N, P, 3], robustly (L1 by
-    reweighting); and the angles [N, P] in radians by which the rays miss them."""
+    """Return points [P, 3] nearest to rays, and the angles [N, P] in radians by which the rays miss them.
+
+    origins: [N, 3]; directions: [N, P, 3], unit. Robust: L1 by reweighting.
+    """
     across = np.eye(3) - directions[..., :, None] * directions[..., None, :]  # [N, P, 3, 3], projects off the ray
     weights = np.ones(directions.shape[:2])
     for _ in range(rounds):
@@ -162,19 +165,21 @@ def intersect_rays(origins: np.ndarray, directions: np.ndarray, rounds: int = 10
 
 
 def _sure(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face]) -> list[tuple]:
-    """Registered images with their faces, without those that the net hardly believes itself, where there are others: in
-    a profile it sees a face from in front that is none."""
-    seen = [
+    """Return registered images with their faces, without those of a low score if there are others.
+
+    In a profile the net sees a frontal face that is not there.
+    """
+    views = [
         (image, face_by_name[image.name])
         for image in sorted(model.images.values(), key=lambda image: image.name)
         if image.has_pose and image.name in face_by_name
     ]
-    sure = [pair for pair in seen if pair[1].score > SURE_SCORE]
-    return sure if len(sure) >= 2 else seen
+    sure = [pair for pair in views if pair[1].score > SURE_SCORE]
+    return sure if len(sure) >= 2 else views
 
 
 def _registered_with_face(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face]) -> list[tuple]:
-    """Registered images with their faces: those that face the camera most."""
-    seen = _sure(model, face_by_name)
-    frontal = [pair for pair in seen if abs(pair[1].yaw_deg) < FRONTAL_DEG]
-    return frontal if len(frontal) >= 4 else seen
+    """Return registered images with their faces, preferably frontal ones."""
+    views = _sure(model, face_by_name)
+    frontal = [pair for pair in views if abs(pair[1].yaw_deg) < FRONTAL_DEG]
+    return frontal if len(frontal) >= 4 else views

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's cameras as JSON, as the add-on writes them from a scene:
+"""Blender's cameras as JSON, as the add-on writes them from a scene.
 
     {"width": 720, "height": 960, "focal_px": 933.3,
      "cameras": [{"frame": 0 and/or "name": "IMG_0001", "matrix_world": [[4 numbers] x 4], and, where they differ,
@@ -20,7 +20,7 @@ from ..calibrated import Calibrated, rigid, trailing_number
 
 
 def read(text: str, name: str) -> list[Calibrated]:
-    """Raises Problem for another kind of JSON, or a camera whose numbers are missing."""
+    """Read Blender's cameras. Raises Problem for other JSON, or a camera with missing numbers."""
     try:
         record = parse_json(text)
     except ValueError as error:

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A COLMAP model's folder: cameras, images, points3D as .bin or .txt, directly or in sparse/ or sparse/0/. Nothing to
-convert."""
+"""Folder of a COLMAP model, which needs no conversion.
+
+It holds cameras, images and points3D as .bin or .txt, directly or in sparse/, sparse/0/ or 0/.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,7 @@ from ..calibrated import PIXELS, Calibrated, trailing_number
 
 
 def read(folder: Path) -> list[Calibrated]:
-    """Raises Problem where there is no model, it is damaged, or its lens model is one of fisheyes."""
+    """Read the cameras of a model. Raises Problem if there is none, it is damaged, or a lens is a fisheye."""
     places = [
         folder / subfolder
         for subfolder in (".", "sparse", "sparse/0", "0")

@@ -20,8 +20,10 @@ MOST_SKEW_PX = 1.0  # COLMAP's lens models have none; less is no error that show
 
 
 def read(text: str, name: str) -> list[Calibrated]:
-    """The aligned cameras of the first chunk. Raises Problem for another kind of XML, a fisheye lens, or what cannot be
-    expressed here."""
+    """Read the aligned cameras of the first chunk.
+
+    Raises Problem for other XML, a fisheye lens, or lens parameters that cannot be expressed here.
+    """
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
@@ -68,7 +70,7 @@ def read(text: str, name: str) -> list[Calibrated]:
 
 
 def _lens(sensor, name: str) -> tuple[str, tuple, int, int] | None:
-    """COLMAP model, params, width, height; None without a calibration."""
+    """Return COLMAP's model and parameters, width and height in pixels; None without a calibration."""
     every = sensor.findall("calibration")
     calibration = next((one for one in every if one.get("class") == "adjusted"), every[0] if every else None)
     if calibration is None:
@@ -112,7 +114,7 @@ def _lens(sensor, name: str) -> tuple[str, tuple, int, int] | None:
 
 
 def _placed(transform) -> tuple[float, np.ndarray, np.ndarray] | None:
-    """scale, rotation [3, 3], translation [3] of a chunk's or component's transform; None where it has none."""
+    """Return scale, rotation [3, 3] and translation [3] of a chunk's or component's transform; None without one."""
     if transform is None or transform.find("rotation") is None:
         return None
 

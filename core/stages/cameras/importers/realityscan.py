@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""RealityScan's (RealityCapture's) CSV "Internal/External camera parameters":
-`#name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2`; newer versions write yaw, f_35mm, px_norm, py_norm.
+"""RealityScan's (RealityCapture's) CSV "Internal/External camera parameters".
 
-x, y, alt: the camera's place, z up. Camera to world is Rz(-heading) Rx(pitch) Ry(roll), degrees, for a camera that
-looks along its -z, y up. f: millimetres of a 36 mm film along the picture's longer side; px, py: from its middle, as
-shares of the longer side. t1, t2 are OpenCV's p2, p1.
+Columns: `#name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2`; newer versions write yaw, f_35mm, px_norm,
+py_norm. x, y, alt: the camera's place, z up. Camera to world is Rz(-heading) Rx(pitch) Ry(roll), degrees, for a camera
+that looks along its -z, y up. f: millimetres of a 36 mm film along the picture's longer side; px, py: from its middle,
+as shares of the longer side. t1, t2 are OpenCV's p2, p1.
 """
 
 from __future__ import annotations
@@ -24,8 +24,10 @@ FILM_MM = 36.0  # width to which its focal lengths are converted (35 mm film)
 
 
 def read(text: str, name: str) -> list[Calibrated]:
-    """Raises Problem for another kind of CSV, a missing column, a value that is no number, or k4, which cannot be
-    expressed here."""
+    """Read the list of cameras.
+
+    Raises Problem for other CSV, a missing column, a value that is not a number, or k4, which cannot be expressed here.
+    """
     rows = [
         row
         for row in csv.reader(io.StringIO(text), delimiter=";" if text.split("\n", 1)[0].count(";") > 5 else ",")
@@ -78,7 +80,7 @@ def read(text: str, name: str) -> list[Calibrated]:
 
 
 def turned(heading: float, pitch: float, roll: float) -> np.ndarray:
-    """Camera to world [3, 3] of these angles [degrees], for a camera that looks along its -z."""
+    """Return camera to world [3, 3] of these angles in degrees, for a camera that looks along its -z."""
     (sh, sp, sr), (ch, cp, cr) = (
         np.sin(np.radians([-heading, pitch, roll])),
         np.cos(np.radians([-heading, pitch, roll])),
