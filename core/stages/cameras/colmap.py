@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""COLMAP in a process of its own, so that a cancel takes effect at once: `python -m core.stages.cameras.colmap
-JOB.json`.
+"""Run COLMAP in a process of its own, so that a cancel takes effect at once.
 
-Says {"step", "done", "of"} as JSON lines on standard output; dies with its parent (end of file on standard input).
-Schoenberger and Frahm, Structure-from-Motion Revisited (2016).
+`python -m core.stages.cameras.colmap JOB.json` prints {"step", "done", "of"} as JSON lines and ends with its parent
+(end of file on standard input). Schoenberger and Frahm, Structure-from-Motion Revisited (2016).
 """
 
 from __future__ import annotations
@@ -37,11 +36,13 @@ LEAST_CARRIED_SHARE = 0.9
 
 
 def reconstruct(job: dict) -> bool:
-    """Runs a job: images (folder), groups [{names, width, height, focal_px or null}] of one camera each, skin (feature
-    settings), film (what skeleton.Film says of the frames; null: all pairs are matched), photographs (few, of straight
-    lenses whose focal length may be any), finer (features from twice the pictures' size on), seed, masks (folder or
-    null), database and output (paths; null: matches are all that is wanted). Writes the largest model to output; False
-    where there is none."""
+    """Run a job and write the largest model to its output; return False if there is none.
+
+    The job holds images (folder), groups [{names, width, height, focal_px or null}] of one camera each, skin (feature
+    settings for low contrast), film (a skeleton.Film; null: match all pairs), photographs (few, of straight lenses with
+    any focal length), finer (detect features from twice the size on), seed, masks (folder or null), database and output
+    (paths; a null output asks for matches only).
+    """
     pycolmap.set_random_seed(job["seed"])
     chosen = (
         _extract_film(job)
@@ -66,8 +67,10 @@ def reconstruct(job: dict) -> bool:
 
 
 def _extract_film(job: dict) -> list[str]:
-    """Features of a film's frames, at half their size of those that are only placed by others; and the frames that
-    carry it."""
+    """Extract features of a film's frames; return the frames that carry it.
+
+    Frames that are only resected later are read at half their size.
+    """
     film, finer = job["film"], job["finer"]
     chosen = _extract(job, skeleton.choose(film, skeleton.size(film)), finer)
     if not finer and _features(job) < LEAST_FEATURES:
@@ -81,8 +84,7 @@ def _extract_film(job: dict) -> list[str]:
 
 
 def _extract(job: dict, names: list[str], finer: bool, reduction: int = 1) -> list[str]:
-    """Features of those pictures `names` that have none yet, looked for in 1/reduction of their size; gives `names`
-    back."""
+    """Extract missing features of the pictures at 1/reduction of their size; return `names`."""
     options = pycolmap.FeatureExtractionOptions()
     options.use_gpu = False
     options.sift.first_octave = -1 if finer else 0
@@ -120,8 +122,10 @@ def _extract(job: dict, names: list[str], finer: bool, reduction: int = 1) -> li
 
 
 def _enter(job: dict) -> None:
-    """The pictures in their order, a camera for each group: extraction would number them as its threads finish, and the
-    mapper's path depends on the numbers."""
+    """Enter the pictures into the database in order, with one camera for each group.
+
+    Extraction would number them in the order in which its threads finish, and the mapper's path depends on the numbers.
+    """
     pycolmap.Database.open(job["database"]).close()  # makes the file
     for group in job["groups"]:
         pycolmap.import_images(
@@ -146,14 +150,14 @@ def _without_features(job: dict) -> set[str]:
 
 
 def _features(job: dict) -> float:
-    """Of the median picture among those looked at."""
+    """Return the number of features of the median picture."""
     with pycolmap.Database.open(job["database"]) as stored:
         looked_at = [image.image_id for image in stored.read_all_images() if stored.exists_keypoints(image.image_id)]
         return statistics.median(stored.num_keypoints_for_image(image) for image in looked_at)
 
 
 def _match(job: dict, pairs: list[tuple[str, str]] | None = None) -> None:
-    """All pairs of pictures, or those named that are not matched yet."""
+    """Match all pairs of pictures, or the given pairs that have no matches yet."""
     _say("matching features", 0, 1)
     options = pycolmap.FeatureMatchingOptions()
     options.use_gpu = False
@@ -178,7 +182,7 @@ def _match(job: dict, pairs: list[tuple[str, str]] | None = None) -> None:
 
 
 def _map_film(job: dict, chosen: list[str]) -> list[pycolmap.Reconstruction]:
-    """The models of a film; of a long one, of the frames chosen to carry it, and the others placed by those."""
+    """Map a film: all frames of a short one, the carrying frames of a long one, by which the others are placed."""
     film = job["film"]
     while True:
         _match(job, skeleton.pairs_within(film, chosen))
@@ -203,8 +207,7 @@ def _map_film(job: dict, chosen: list[str]) -> list[pycolmap.Reconstruction]:
 
 
 def _map_photographs(job: dict) -> list[pycolmap.Reconstruction]:
-    """The models from every focal length of FOCAL_SHARES, where one is not told; what comes after the matches takes
-    little time."""
+    """Map photographs from every focal length of FOCAL_SHARES if none is known."""
     unknown = [(camera_id, group) for camera_id, group in enumerate(job["groups"], 1) if not group["focal_px"]]
     models = []
     for factor in FOCAL_SHARES if unknown else (PHONE_FOCAL_SHARE,):
@@ -223,7 +226,7 @@ def _map_photographs(job: dict) -> list[pycolmap.Reconstruction]:
 
 
 def _worth(model: pycolmap.Reconstruction) -> tuple[int, int]:
-    """Which of several models is best: more frames first, then more of what was seen explained."""
+    """Rank a model: by its frames, then by its observations."""
     return model.num_reg_images(), model.compute_num_observations()
 
 
@@ -265,8 +268,11 @@ def _map(job: dict, names: list[str] | None = None) -> list[pycolmap.Reconstruct
 
 
 def _aside(function, *arguments) -> None:
-    """While COLMAP's threads find and match features, the thread that called it spins and takes a core of its own. On
-    Linux that thread is set, once the others have begun, to get only time that nobody wants."""
+    """Call COLMAP's feature extraction or matching without giving a core to the caller.
+
+    The thread that calls it spins while COLMAP's threads work. On Linux it is set, once those have started, to take
+    idle time only.
+    """
     with ThreadPoolExecutor(1, initializer=lambda: threads.append(threading.get_native_id())) as caller:
         threads = []
         call = caller.submit(function, *arguments)

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cameras that are nearly right, made right: poses, focal lengths, identity and matched points adjusted at once, with
-what structure from motion left out.
+"""Refine nearly right cameras: poses, focal lengths, identity and matched points in one bundle adjustment.
 
-Cameras say which of all matches can be true, and more of them make better cameras. The face's landmarks, on a head of
-people's size and shape, hold what a few photographs alone leave open.
+Cameras tell which matches can be true, and more matches improve the cameras. The face's landmarks, on a head of
+plausible size and shape, fix what a few photographs alone leave open.
 """
 
 from __future__ import annotations
@@ -46,28 +45,13 @@ def refine(
     missing: Sequence[dict] = (),
     agree: Sequence[float] = AGREE_WIDTH_SHARES,
 ) -> pycolmap.Reconstruction:
-    """The cameras refined by what matches on the head.
+    """Refine the cameras of a model by the matches on the head.
 
-    Parameters
-    ----------
-    model : cameras, of any world
-    face_by_name : the face in each frame that shows one
-    matches : between the frames
-    told : name -> focal length in pixels, of the frames whose file tells one
-    report : hears of progress
-    missing : [{names, width, height, focal_px}] like camera groups, of frames that have no camera yet and may get one
-        by their matches; they share the lens of the frames of their size, unless another one was told of those
-    agree : as AGREE_WIDTH_SHARES, wider first where the cameras may be off
-
-    Returns
-    -------
-    The refined model, in the head's world (metres), or `model` itself where too little matches or the refined one
-    explains less.
-
-    Raises
-    ------
-    Problem
-        Where no face is found.
+    `told` maps names to focal lengths in pixels from the files. `missing` lists camera groups {names, width, height,
+    focal_px} of frames without a camera, which may get one by their matches and share the lens of frames of their size
+    unless their own is known. `agree`: as AGREE_WIDTH_SHARES, wider first if the cameras may be off. Returns the model
+    in the head's world (metres), or `model` itself if too little matches or the refined one explains less. Raises
+    Problem if no face is found.
     """
     head = find_head(model, face_by_name, PUPILS_M)
     model = pycolmap.Reconstruction(model)
@@ -102,13 +86,13 @@ def refine(
 
 
 def _told_of_lenses(model: pycolmap.Reconstruction, registered: list, told: Mapping[str, float]) -> dict:
-    """Number of a camera -> the focal length that a file told of it, None where none did."""
+    """Map the number of each camera to the focal length in its files, None if there is none."""
     lenses = dict.fromkeys(model.cameras)
     return lenses | {image.camera_id: told[image.name] for image in registered if image.name in told}
 
 
 def _lenses_of(group: dict, model: pycolmap.Reconstruction, lenses: Mapping[int, float | None]) -> list[int]:
-    """Numbers of the cameras that may have taken a group of frames."""
+    """Return the numbers of the cameras that may have taken a group of frames."""
     return [
         number
         for number, camera in model.cameras.items()
@@ -118,8 +102,10 @@ def _lenses_of(group: dict, model: pycolmap.Reconstruction, lenses: Mapping[int,
 
 
 def as_bundle(model: pycolmap.Reconstruction, registered: list, told: Mapping[str, float]) -> Bundle:
-    """The model's cameras, in the head's world, of the frames `registered`; each focal length with the one that was
-    told as its prior, where one was."""
+    """Return the cameras of the frames `registered` as a bundle in the head's world.
+
+    A focal length from a file is a prior.
+    """
     lenses = _told_of_lenses(model, registered, told)
     numbers = sorted(model.cameras)
     poses = [pose_of(image) for image in registered]
@@ -151,13 +137,13 @@ def _landmarks(model: pycolmap.Reconstruction, registered: list, face_by_name: d
 
 
 def _straight(camera: pycolmap.Camera, pixels: np.ndarray) -> np.ndarray:
-    """Pixels [N, 2] as a lens without distortion, with square pixels, would show them."""
+    """Map pixels [N, 2] to those of a lens without distortion, with square pixels."""
     plane = np.asarray(camera.cam_from_img(pixels)).reshape(-1, 2)
     return plane * camera.mean_focal_length() + [camera.principal_point_x, camera.principal_point_y]
 
 
 def straightened(model: pycolmap.Reconstruction, registered: list, matches: Matches) -> Matches:
-    """The matches with pixels as lenses without distortion would show them."""
+    """Return the matches with pixels of lenses without distortion."""
     camera_of = {image.name: model.cameras[image.camera_id] for image in registered}
     keypoints = {
         name: _straight(camera_of[name], pixels) if name in camera_of and len(pixels) else pixels
@@ -184,17 +170,11 @@ def rebuilt(
     late: Mapping[str, tuple] = MappingProxyType({}),
     groups: Sequence[dict] = (),
 ) -> pycolmap.Reconstruction:
-    """A model with a bundle's cameras and, as its points, the tracks.
+    """Return the model with a bundle's cameras, and with its tracks as points.
 
-    Parameters
-    ----------
-    model : whose lenses are kept but for their focal lengths
-    bundle : poses, focal lengths and points
-    registered : the model's images, in the bundle's order
-    tracks : of the bundle's points
-    matches : whose keypoints they join
-    late : rotation and translation by the name of frames that were placed afterwards
-    groups : camera groups, of these
+    Lenses keep all but their focal lengths. `registered` and `tracks` are in the bundle's order, `matches` holds the
+    keypoints; `late` maps frames that were placed afterwards, of the camera groups `groups`, to rotation and
+    translation.
     """
     rebuilt, numbers = pycolmap.Reconstruction(), sorted(model.cameras)
     for number in numbers:
@@ -231,6 +211,6 @@ def rebuilt(
 
 
 def holds_every_frame(model: pycolmap.Reconstruction) -> bool:
-    """Whether every registered frame sees as many matched points as its pose needs."""
+    """Return True if every registered frame has as many matched points as its pose needs."""
     seen = Counter(element.image_id for point in model.points3D.values() for element in point.track.elements)
     return all(seen[number] >= LEAST_MATCHES for number, image in model.images.items() if image.has_pose)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Feature matches between frames, as COLMAP found them before it chose one motion for them all; and tracks of them."""
+"""Feature matches between frames, before COLMAP chooses one motion for all of them, and their tracks."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from scipy.sparse.csgraph import connected_components
 
 @dataclass(frozen=True)
 class Matches:
-    """keypoints: name -> pixels [K, 2], centres at +0.5; pairs: (name, name) -> indices [M, 2] into the keypoints of
-    the two."""
+    """Keypoints by name, pixels [K, 2] with centres at +0.5, and index pairs [M, 2] by (name, name)."""
 
     keypoints: dict[str, np.ndarray] = field(default_factory=dict)
     pairs: dict[tuple[str, str], np.ndarray] = field(default_factory=dict)
 
     def between(self, first: str, second: str) -> tuple[np.ndarray, np.ndarray]:
-        """The pixels [M, 2] in either frame of a pair that is in `pairs`."""
+        """Return the pixels [M, 2] in both frames of a pair in `pairs`."""
         index = self.pairs[first, second]
         return self.keypoints[first][index[:, 0]], self.keypoints[second][index[:, 1]]
 
     def scaled(self, scales: dict[str, tuple[float, float]]) -> Matches:
-        """The same matches in pictures of another size: name with its folder -> how much wider and higher. The names
-        lose their folder."""
+        """Return the matches in pictures of another size, their names without a folder.
+
+        `scales` maps a name with its folder to the factors of width and height.
+        """
         plain = {name: PurePosixPath(name).name for name in self.keypoints}
         keypoints = {plain[name]: pixels * scales[name] for name, pixels in self.keypoints.items()}
         return Matches(
@@ -36,12 +37,12 @@ class Matches:
         )
 
     def kept(self, keep: dict[tuple[str, str], np.ndarray]) -> Matches:
-        """Only those matches of each pair that `keep` [M] says."""
+        """Return the matches that the masks `keep`, bool [M] for each pair, select."""
         return Matches(self.keypoints, {pair: index[keep[pair]] for pair, index in self.pairs.items() if pair in keep})
 
 
 def read_matches(database: Path) -> Matches:
-    """All matches of a COLMAP database, verified or not."""
+    """Read all matches of a COLMAP database, verified or not."""
     with pycolmap.Database.open(str(database)) as stored:
         names = {image.image_id: image.name for image in stored.read_all_images()}
         keypoints = {
@@ -57,8 +58,7 @@ def read_matches(database: Path) -> Matches:
 
 
 def tracks(matches: Matches) -> list[list[tuple[str, int]]]:
-    """Keypoints that are one point, as lists of (name, keypoint): what is matched hangs together. One that meets a
-    frame twice is ambiguous and left out."""
+    """Join matches to tracks, lists of (name, keypoint); a track that meets a frame twice is left out."""
     names = sorted({name for pair in matches.pairs for name in pair})
     start = dict(zip(names, np.cumsum([0] + [len(matches.keypoints[name]) for name in names])[:-1], strict=True))
     total = sum(len(matches.keypoints[name]) for name in names)

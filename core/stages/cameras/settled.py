@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head that swayed while it was filmed: cameras that were found from the whole picture, found anew with respect to
-the head, by what matches on it.
+"""Cameras of a film whose subject swayed: solved again with respect to the head, by the matches on it.
 
 Structure from motion follows the room, which shows more; a person who sits still sways before it by millimetres.
-Whether they did is measured: poses that half of the head's matches give must tell better than the room's where the
-other half lies. (That all of them fit better by poses of their own says nothing: more freedom always fits better.)
+Whether they did is measured: poses from half of the head's matches must predict the other half better than the room's
+poses do. (A better fit of all matches by poses of their own proves nothing: more freedom always fits better.)
 """
 
 from __future__ import annotations
@@ -47,7 +46,7 @@ frame below which they are not."""
 
 @dataclass(frozen=True)
 class HeadCameras:
-    """Cameras with respect to the head: as a bundle, as the model that has them, and the tracks that told them."""
+    """Cameras with respect to the head: the bundle, its model, and the tracks behind it."""
 
     bundle: Bundle
     model: pycolmap.Reconstruction
@@ -61,20 +60,11 @@ def settle(
     report: Reporter,
     by: Collection[str] | None = None,
 ) -> tuple[pycolmap.Reconstruction, float | None]:
-    """The model with its cameras placed with respect to the head, in the template's world.
+    """Place the cameras of a model with respect to the head, in the template's world.
 
-    Parameters
-    ----------
-    model : cameras, of any world
-    head : in that world
-    matches : between the frames
-    report : hears of progress
-    by : the frames that tell, all if not given; each of the others is placed by the points of those
-
-    Returns
-    -------
-    The model and the share of the error that is left of the head's matches (see MOST_LEFT_SHARE); `model` itself and
-    None where the head kept still, or where too little matches on it to tell.
+    `head` is given in the model's world; `by` names the frames to solve from (default: all), by whose points the others
+    are placed. Returns the model and the share of the error of the head's matches that remains (see MOST_LEFT_SHARE),
+    or `model` itself and None if the head kept still or too little matches on it.
     """
     room = pycolmap.Reconstruction(model)
     room.transform(head.template_from_model)
@@ -113,7 +103,7 @@ def _follow(
     width: float,
     report: Reporter,
 ) -> HeadCameras:
-    """The cameras with respect to the head, by these of its matches (`straight`: of their pixels without the lens)."""
+    """Solve the cameras with respect to the head from its matches (`straight`: without lens distortion)."""
     names = [image.name for image in registered]
     for step, share in enumerate(REACH_WIDTH_SHARES):
         report.progress(step, len(REACH_WIDTH_SHARES), "finding the cameras with respect to the head")
@@ -125,7 +115,7 @@ def _follow(
 
 
 def _halves(matches: Matches, tracks: list) -> tuple[Matches, Matches]:
-    """The matches of every other track, and those of the rest."""
+    """Split the matches into those of every other track and the rest."""
     half = {seen: number % 2 for number, track in enumerate(tracks) for seen in track}
     sides = {
         pair: np.array([[half.get((name, int(k)), -1) for k in index[:, i]] for i, name in enumerate(pair)])
@@ -136,7 +126,7 @@ def _halves(matches: Matches, tracks: list) -> tuple[Matches, Matches]:
 
 
 def _miss(bundle: Bundle, names: list[str], matches: Matches, reach_px: float) -> float:
-    """By how many pixels the median observation misses the point that its track's rays meet nearest."""
+    """Return the median distance in pixels of an observation to the point nearest to its track's rays."""
     (camera, point, pixel), _, placed = agreeing(bundle, names, matches, reach_px)
     return float(np.median(np.linalg.norm(placed.project(camera, point) - pixel, axis=1))) if len(pixel) else np.inf
 
@@ -149,8 +139,10 @@ def _with_others(
     own: Matches,
     straight: Matches,
 ) -> pycolmap.Reconstruction:
-    """The model of the frames `registered` with the others of `everything`: placed by its points, or where they were in
-    the room if they show too few."""
+    """Add the other frames of `everything` to the model of the frames `registered`.
+
+    They are placed by its points, or stay where they were in the room if they show too few.
+    """
     alone, bundle, tracks = cameras.model, cameras.bundle, cameras.tracks
     names = [image.name for image in registered]
     pose_by_name = {image.name: pose_of(image) for image in alone.images.values()}
@@ -185,8 +177,10 @@ def _with_others(
 
 
 def head_boxes(model: pycolmap.Reconstruction, head: HeadFrame) -> dict[str, tuple[int, int, int, int]]:
-    """Name -> left, top, right and bottom, in pixels, of a part that shows the head, with some air around it, in each
-    frame of `model` where the head is more than a dot. The parts are of one size, as pictures of one camera are."""
+    """Return for each frame the box (left, top, right, bottom) in pixels around the head, with a margin.
+
+    Frames in which the head is a dot have none. All boxes are of one size, as pictures of one camera are.
+    """
     room, outlines = pycolmap.Reconstruction(model), {}
     room.transform(head.template_from_model)
     for image in room.images.values():
@@ -210,7 +204,7 @@ def head_boxes(model: pycolmap.Reconstruction, head: HeadFrame) -> dict[str, tup
 
 
 def on_head(model: pycolmap.Reconstruction, registered: list, matches: Matches) -> Matches:
-    """The matches between keypoints on the head; model: in the head's world."""
+    """Return the matches between keypoints on the head; `model` is in the head's world."""
     inside = {}
     for image in registered:
         camera, outline = model.cameras[image.camera_id], _outline(model, image)
@@ -231,8 +225,7 @@ def on_head(model: pycolmap.Reconstruction, registered: list, matches: Matches) 
 
 
 def _outline(model: pycolmap.Reconstruction, image: pycolmap.Image) -> np.ndarray | None:
-    """Corners int32 [N, 2] in pixels of the convex outline of the template's head in a frame; None where it reaches
-    behind the camera."""
+    """Return the convex outline of the head, int32 [N, 2] in pixels, None if it reaches behind the camera."""
     points, pose = template.load().vertices, pose_of(image)
     local = points[points[:, 2] > CHEST_M] @ pose.rotation.matrix().T + pose.translation
     if (local[:, 2] < 0.05).any():
@@ -242,7 +235,7 @@ def _outline(model: pycolmap.Reconstruction, image: pycolmap.Image) -> np.ndarra
 
 
 def _face_width(model: pycolmap.Reconstruction, registered: list) -> float:
-    """Of the head's landmarks in pixels, in the median frame."""
+    """Return the width in pixels of the head's landmarks in the median frame."""
     across = np.ptp(template_landmarks().mean[:, 0])
     depth = [(pose_of(image).rotation.matrix() @ np.zeros(3) + pose_of(image).translation)[2] for image in registered]
     return float(
@@ -256,8 +249,7 @@ def _face_width(model: pycolmap.Reconstruction, registered: list) -> float:
 
 
 def _adjust(model: pycolmap.Reconstruction) -> None:
-    """Poses and points to the least reprojection error, in place; focal lengths stay: the room, which shows more, has
-    told them."""
+    """Minimise the reprojection error over poses and points, in place."""
     options = pycolmap.BundleAdjustmentOptions()
     options.refine_focal_length = options.refine_extra_params = False
     options.print_summary = False
@@ -272,8 +264,10 @@ def _adjust(model: pycolmap.Reconstruction) -> None:
 
 
 def _with_poses(bundle: Bundle, model: pycolmap.Reconstruction, names: list[str], tracks: list) -> Bundle:
-    """The bundle with the adjusted poses; a frame that shows too little of the head keeps its place among the others.
-    The world stays the head's."""
+    """Return the bundle with the adjusted poses, in the head's world.
+
+    A frame that shows too little of the head keeps its place among the others.
+    """
     shown = Counter(name for track in tracks for name, _ in track)
     firm = np.array([shown[name] >= LEAST_MATCHES for name in names])
     pose_by_name = {image.name: pose_of(image) for image in model.images.values()}

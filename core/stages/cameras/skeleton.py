@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The frames of a film that carry its structure: which they are, which pairs are matched, and how the others are placed
-by them.
+"""Frames that carry a film's structure: their choice, the pairs to match, and the resection of the others.
 
 Structure from motion grows faster than the film, and neighbours in a film show nearly the same. So some frames along
 the arc are mapped, and each of the others is resected from the points of those around it (Schoenberger and Frahm,
@@ -32,16 +31,20 @@ Film = Sequence[tuple[str, float, float | None]]
 
 
 def size(film: Film, richness: float = 1.0) -> int:
-    """How many frames carry a film: all of a short one, and of a long one twice as many, as often as needed, where each
-    shows little. richness: the median frame's features as a share of what a frame may have, of which ENOUGH_SHARE will
-    do. A plain head's frames cost less, and it takes more of them."""
+    """Return how many frames carry a film: all of a short one, more of a long one if each shows little.
+
+    `richness` is the median frame's share of the features that a frame may have; ENOUGH_SHARE suffices, and below it
+    the number is doubled as often as needed. Frames of a plain head cost less, and it takes more of them.
+    """
     count = CARRYING_FRAMES * 2 ** max(0, math.ceil(math.log2(ENOUGH_SHARE / max(richness, 1e-3))))
     return min(len(film), count)
 
 
 def choose(film: Film, count: int) -> list[str]:
-    """The sharpest frame of each of `count` equal parts of the film, in order; all of them where there are no more.
-    Twice as many hold these, too."""
+    """Choose the sharpest frame of each of `count` equal parts of the film, in order.
+
+    All frames if there are no more; a choice of twice as many contains this one.
+    """
     if len(film) <= count:
         return [name for name, _, _ in film]
     bounds = np.linspace(0, len(film), count + 1).round().astype(int)
@@ -49,8 +52,7 @@ def choose(film: Film, count: int) -> list[str]:
 
 
 def pairs_within(film: Film, chosen: Sequence[str]) -> list[tuple[str, str]]:
-    """Each chosen frame with its neighbours, with those at powers of two, and with those that look from the same side
-    at another time."""
+    """Pair each carrying frame with neighbours, those at powers of two, and later ones of the same view."""
     turn = {name: degrees for name, _, degrees in film}
     pairs = set()
     for i, name in enumerate(chosen):
@@ -68,7 +70,7 @@ def pairs_within(film: Film, chosen: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def pairs_between(film: Film, chosen: Sequence[str]) -> list[tuple[str, str]]:
-    """Each other frame with the two of `chosen`, which are mapped, before it and the two after it."""
+    """Pair each other frame with the two carrying frames before it and the two after it."""
     place = {name: i for i, (name, _, _) in enumerate(film)}
     at = np.array([place[name] for name in chosen])
     rest = [name for name, _, _ in film if name not in set(chosen)]
@@ -81,16 +83,9 @@ def pairs_between(film: Film, chosen: Sequence[str]) -> list[tuple[str, str]]:
 def place_others(
     model: pycolmap.Reconstruction, database: Path, names: Sequence[str], seed: int, step: Callable[[int, int], None]
 ) -> None:
-    """Adds those frames to the model whose matches with its frames give a pose; their keypoints become observations of
-    its points.
+    """Resect the named frames from the model's points and add them to it, with their observations.
 
-    Parameters
-    ----------
-    model : changes
-    database : COLMAP's, with keypoints and matches
-    names : of the frames
-    seed : of RANSAC
-    step : hears (done, of)
+    `database` is COLMAP's, with keypoints and matches; `seed` is RANSAC's; `step` is called with (done, of).
     """
     options, refined = pycolmap.AbsolutePoseEstimationOptions(), pycolmap.AbsolutePoseRefinementOptions()
     options.ransac.max_error, options.ransac.random_seed = REACH_PX, seed
@@ -114,8 +109,7 @@ def place_others(
 
 
 def _points_of(model: pycolmap.Reconstruction, matched: list[tuple[int, np.ndarray]]) -> dict[int, int]:
-    """Point -> keypoint of the frame that shows it, by the matches with mapped frames; each keypoint and each point
-    once."""
+    """Map points to the keypoints of a frame by its matches with mapped frames, each at most once."""
     keypoints, taken = {}, set()
     for one, index in matched:
         seen = model.images[one].points2D

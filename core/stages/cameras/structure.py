@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Structure from motion over a capture's frames: starts COLMAP's process, follows it, and gives back its model."""
+"""Structure from motion over a capture's frames, by COLMAP in a process of its own."""
 
 from __future__ import annotations
 
@@ -36,22 +36,11 @@ NO_MODEL = 3
 def solve_structure(
     frames: Frames, capture: Capture, skin: bool, matching: str, seed: int, report: Reporter, masks: Path | None = None
 ) -> tuple[pycolmap.Reconstruction | None, Matches]:
-    """The largest model of the capture's frames, and all matches. Photographs are looked at as large as they were kept,
-    though not with masks; pixels are the frames' in any case.
+    """Return the largest model of the capture's frames, in COLMAP's world, or None, and all matches.
 
-    Parameters
-    ----------
-    frames : of the capture
-    capture : that holds them
-    skin : whether features are looked for that hold on low-contrast skin
-    matching : "auto", "sequential" or "exhaustive"
-    seed : of COLMAP
-    report : hears of progress
-    masks : folder with NAME.png, where black hides what moves otherwise
-
-    Returns
-    -------
-    The model in COLMAP's own world (None where nothing fits together), and the matches.
+    Photographs are read at the size at which they are stored, though not with masks; pixels are always those of the
+    frames. `skin`: detect features that hold on low-contrast skin; `matching`: "auto", "sequential" or "exhaustive";
+    `masks`: a folder with NAME.png, black where something else moves.
     """
     records, folder = frames.records, capture.frames
     is_film = frames.kind == VIDEO and len(records) > ALL_PAIRS_FRAMES
@@ -96,19 +85,10 @@ def solve_structure(
 def match_crops(
     boxes: dict[str, tuple[int, int, int, int]], frames: Frames, capture: Capture, seed: int, report: Reporter
 ) -> tuple[Matches, list[str]]:
-    """Matches of fine features within a part of each frame of a film.
+    """Match fine features within one box of each frame of a film.
 
-    Parameters
-    ----------
-    boxes : name -> left, top, right and bottom of that part, in pixels
-    frames : of the capture
-    capture : that holds them
-    seed : of COLMAP
-    report : hears of progress
-
-    Returns
-    -------
-    The matches, in the frames' pixels, and the frames that carry the film there.
+    `boxes` maps names to (left, top, right, bottom) in pixels. Returns the matches in the frames' pixels, and the
+    frames that carry the film there.
     """
     with capture.workspace() as work:
         (work / "parts").mkdir()
@@ -149,13 +129,12 @@ def match_crops(
 
 
 def film_of(records: Sequence[FrameRecord]) -> skeleton.Film:
-    """What is chosen by which frames carry a film."""
+    """Describe the frames for the choice of those that carry a film."""
     return [(record.name, record.sharpness, record.yaw_deg) for record in records]
 
 
 def camera_groups(records: Sequence[FrameRecord], folder: Path) -> list[dict]:
-    """Frames that share a camera, those of one size and one focal length: [{names, width, height, focal_px or
-    None}]."""
+    """Group frames of one size and one focal length: [{names, width, height, focal_px or None}]."""
     groups = {}
     for record in records:
         width, height = images.size(folder / record.name)
@@ -165,8 +144,7 @@ def camera_groups(records: Sequence[FrameRecord], folder: Path) -> list[dict]:
 
 
 def _enlarged(groups: list[dict], folder: Path) -> list[dict]:
-    """The same groups of the larger pictures of these frames, whose names are full/NAME; those that have none stay as
-    they are."""
+    """Return the groups of the larger pictures, named full/NAME; frames that have none stay."""
     split: dict[tuple, dict] = {}
     for number, group in enumerate(groups):
         for name in group["names"]:
@@ -182,7 +160,7 @@ def _enlarged(groups: list[dict], folder: Path) -> list[dict]:
 
 
 def _reduce(model: pycolmap.Reconstruction, sizes: dict[str, tuple[int, int]]) -> None:
-    """Brings a model of the larger pictures to the frames' own names and sizes (name -> width, height)."""
+    """Scale a model of the larger pictures to the frames' names and sizes (name to width, height), in place."""
     before = {number: (camera.width, camera.height) for number, camera in model.cameras.items()}
     for image in model.images.values():
         image.name = PurePosixPath(image.name).name
@@ -197,7 +175,7 @@ def _reduce(model: pycolmap.Reconstruction, sizes: dict[str, tuple[int, int]]) -
 
 
 def _follow(job: Path, report: Reporter) -> bool:
-    """Runs COLMAP's process, reporting its progress; ends it at a cancel. True where it made a model."""
+    """Run COLMAP's process and report its progress; end it at a cancel. Return True if it made a model."""
     command = [sys.executable, "-E", "-s", "-B", "-m", f"{__package__}.colmap", str(job)]
     process = subprocess.Popen(
         command,
