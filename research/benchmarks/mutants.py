@@ -9,7 +9,8 @@
 `draw` picks faults at random: an operator, a comparison, a condition or a number in a function of the product. `trace`
 runs the whole suite once over a copy in which those functions note the tests that enter them. `run` puts in one fault
 after another and runs the tests that enter its function, nearest first, until one fails; that one is recorded. A fault
-is named by its file, function, kind and position, so that it is found again wherever the function has moved.
+is named by its file, function, kind and position; "code" is the expression it changes, by which a function that was
+rewritten is searched by hand, and "killed_before" the test that found it at commit e5e14778.
 """
 
 from __future__ import annotations
@@ -170,6 +171,9 @@ def trace(mutants: list[dict], tree: Path) -> None:
         parsed = ast.parse((tree / file).read_text(encoding="utf-8"))
         nodes = dict(functions_of(parsed))
         for number, name in functions:
+            if name not in nodes:
+                print(f"{file} has no {name} any more.")
+                continue
             body = nodes[name].body
             after_docstring = int(isinstance(body[0], ast.Expr) and isinstance(body[0].value, ast.Constant))
             body.insert(after_docstring, ast.parse(f"_note_hit({number})").body[0])
