@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[4]
 
 def test_killed_at_any_step_it_goes_on_where_it_was(tmp_path, full_light):
     """The real worker on the real stage; test_solve.py compares the bytes."""
-    capture, step = make(tmp_path / "a.wildcap"), random.randint(3, SHORT["steps"] - 1)
+    capture, step = make(tmp_path / "a.wildcap"), random.randint(3, SHORT["steps"] - 2)
     job = write_job(capture, first="solve", last="solve", settings={"solve": SHORT, "device": "cpu"})
     worker = Worker(Path(sys.executable), ROOT, job, capture.logs / "worker.log")
     worker.start()
