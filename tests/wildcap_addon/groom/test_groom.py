@@ -93,10 +93,10 @@ def test_what_was_combed_stays_and_the_rest_grows_anew(hair, addon):
 
 
 def test_what_was_thickened_stays(hair):
-    radius = hair[0].data.attributes["radius"].data[0]
-    radius.value = 1e-3
+    brows = hair[0].data
+    brows.attributes["radius"].data[0].value = 1e-3
     bpy.ops.wildcap.grow_hair(share=0.5)
-    assert radius.value == pytest.approx(1e-3) and len(hair[0].data.curves) == 40
+    assert brows.attributes["radius"].data[0].value == pytest.approx(1e-3) and len(brows.curves) == 40
 
 
 def test_a_beard_is_as_long_as_the_artist_says_and_as_it_was_grown_where_they_say_nothing(capture, strands, addon):
