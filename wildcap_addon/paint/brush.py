@@ -61,6 +61,19 @@ def restore(context, before: dict) -> None:
             bpy.data.brushes.remove(each)
 
 
+@contextlib.contextmanager
+def keep_active(context):
+    """Keep the active brush while the mode is entered anew.
+
+    Blender 4.2 activates its tool's own brush then, which paints on the texture in place of the mask.
+    """
+    paint = context.scene.tool_settings.image_paint
+    active = paint.brush
+    yield
+    if bpy.app.version < (4, 3, 0):
+        paint.brush = active
+
+
 def _came_with_tool(brush, before: dict) -> bool:
     return (
         brush.library is not None

@@ -114,7 +114,8 @@ def begin_painting(context, item, use_sheet: bool, mask_kind: str = 'SHADOW') ->
     global _session
     if _session is not None and _session.which == mask_kind:
         places.follow_name(_session)
-        places.turn(context, _session, use_sheet)
+        with brush.keep_active(context):
+            places.turn(context, _session, use_sheet)
         return
     end_painting(context)
     capture = captures.folder(item)
