@@ -28,7 +28,8 @@ WINDOW_TEXELS = 8.0  # deviation of the windows over which a side is averaged
 INWARDS_TEXELS = 40.0  # deviation over which a step holds for what is around it
 MIN_BORDER_SHARE = 0.05  # share of a window of INWARDS_TEXELS that border must fill, for its step to hold by half
 MAX_MISSING_SHARE = 0.9  # more of the light than this never goes
-# deviation, along M's border, of the step in the light that a delighter left, natural log
+# deviation, along M's border, of the step in the light that a delighter left, natural log:
+# research/benchmarks/light/shadow_steps.py
 LEFT_LOG = 0.14
 
 

@@ -23,7 +23,8 @@ from ...imaging import images
 LEFT_LIDS, RIGHT_LIDS = faces.EYE_LINES
 PUPILS_PER_LIDS = 63.0 / 62.156 / 1.019
 """The template's pupils are 63 mm apart, the middles of its lids' outlines a little less; and the head that fits a
-net's landmarks came out 1.9 % too large over six synthetic heads of known size."""
+net's landmarks came out 1.9 % too large over six synthetic heads of known size
+(research/benchmarks/head/head_scale.py)."""
 
 
 def find_landmarks(

@@ -30,7 +30,8 @@ class Weighing:
 
 
 FITTED = Weighing(share=0.6, doubt=0.15)
-"""For the fitted light: the best over twelve people in sixteen captures."""
+"""For the fitted light: the best over twelve people in sixteen captures
+(research/benchmarks/delighting/delight_answers.py)."""
 
 
 def weigh_in(
