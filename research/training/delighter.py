@@ -16,7 +16,6 @@ from functools import partial
 
 import numpy as np
 import torch
-from safetensors.torch import load_file
 from torch.nn import functional
 
 from core.capture.messages import Reporter
@@ -25,7 +24,7 @@ from core.stages.solve.prior_files import fast_dtype
 
 from ..people.environments import read_panoramas
 from . import people, portraits
-from .descent import Batches, Recipe, Run, Task, cosine, resume
+from .descent import Recipe, Run, Task, cosine
 from .networks import Card, Training
 from .portraits import PortraitBatch, mirrored, repainted
 from .prior import named_data
@@ -59,19 +58,18 @@ TONE, SLOPE, AGREEMENT, SHADOW = 0.25, 1.0, 0.25, 0.3
 the shadows."""
 
 
-def prepare(run: Run, report: Reporter) -> None:
+def prepare(run: Run, options: dict, report: Reporter) -> None:
     """Make the sights of people and of bald subjects, those of the held-out ones first."""
-    data, (subjects, figures) = open_data(run)
-    processes = CONFIGS[run.config]["training"]["workers"] + 1
+    data, (subjects, figures) = open_data(run, options)
+    processes = options["workers"] + 1
     figures.store.prepare(data["held_out_seeds"] + figures.seeds, people.make_sights, report, processes)
     subjects.store.prepare(data["held_out_seeds"], portraits.make_sights, report, processes)
     in_skins = partial(portraits.make_sights, skins=run.skins, names=data["skins"])
     subjects.store.prepare(subjects.seeds, in_skins, report, processes)
 
 
-def open_data(run: Run) -> tuple[dict, tuple[Source, Source]]:
+def open_data(run: Run, options: dict) -> tuple[dict, tuple[Source, Source]]:
     """Return the names of the data, and its sources: bald subjects and people."""
-    options = CONFIGS[run.config]["training"]
     data = named_data(options, run.skins, run.held_out) | {
         "panoramas": panorama_names(run.hdri),
         "people": training_seeds(options["people"]),
@@ -85,25 +83,19 @@ def open_data(run: Run) -> tuple[dict, tuple[Source, Source]]:
     )
 
 
-def start(run: Run, report: Reporter) -> Task:
-    """Open the data and the network."""
-    config, (data, sources) = CONFIGS[run.config], open_data(run)
-    options = config["training"]
+def start(run: Run, options: dict, report: Reporter) -> Task:
+    """Open the data."""
+    data, sources = open_data(run, options)
     held_out = {}
     for kind, source in zip(("", "people_"), sources, strict=True):
         unseen = replace(source, seeds=data["held_out_seeds"])
         examples = unseen.draw(4 * options["held_out"], np.random.default_rng(1), augment=False)
         held_out[kind] = stack_examples(PortraitBatch, examples)
-    torch.manual_seed(options["seed"])
-    network = DelightNet(**config["model"])
-    if run.start:
-        network.load_state_dict({name: value.float() for name, value in load_file(run.start).items()})
     return Task(
-        network,
-        resume(run, data, network),
-        Batches(partial(_draw_step, *sources, options), options["seed"], options["echo"]),
-        lambda network, batch, step, share: sum(losses(network, batch).values()),
-        lambda network: {
+        data,
+        partial(_draw_step, *sources, options),
+        lambda network, batch, state, share: sum(losses(network, batch).values()),
+        lambda network, state: {
             kind + name: value for kind, batch in held_out.items() for name, value in measure(network, batch).items()
         },
     )
@@ -181,6 +173,7 @@ TRAINING = Training(
     "delighter",
     CONFIGS,
     Recipe(200, cosine(0.01), (0.9, 0.98), weight_decay=1e-2, averaging=0.998, save_every=600),
+    lambda config: DelightNet(**config["model"]),
     start,
     describe,
     prepare,

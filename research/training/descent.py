@@ -12,7 +12,7 @@ import copy
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -63,17 +63,18 @@ class Recipe:
 
 @dataclass(frozen=True)
 class Task:
-    """What is learnt in a run.
+    """Training data and objective of a run.
 
-    state: as `resume` returns it; batches: `Batches`; loss(network, batch, step, share of the time): a scalar;
-    measure(network): the figures on held-out data that the history keeps.
+    data: names of what is learnt from and of what is held out; draw: as in Batches; loss(network, batch, state, share
+    of the time): a scalar; measure(network, state): the figures on held-out data that the history keeps; more: further
+    entries of the state.
     """
 
-    network: torch.nn.Module
-    state: dict
-    batches: Batches
+    data: dict
+    draw: Callable[[int, np.random.Generator], list]
     loss: Callable[..., torch.Tensor]
-    measure: Callable[[torch.nn.Module], object]
+    measure: Callable[[torch.nn.Module, dict], object]
+    more: dict = field(default_factory=dict)
 
 
 class Batches(Dataset):
@@ -83,7 +84,7 @@ class Batches(Dataset):
     making data costs as much as learning from it, twice is cheaper than new. A batch is a NamedTuple of tensors.
     """
 
-    def __init__(self, draw: Callable[[int, np.random.Generator], list], seed: int, echo: int = 1):
+    def __init__(self, draw: Callable[[int, np.random.Generator], list], seed: int, echo: int):
         self.draw, self.seed, self.echo = draw, seed, echo
         self.index, self.drawn = -1, []
 
@@ -99,18 +100,18 @@ def cosine(least: float) -> Callable[[float], float]:
     return lambda share: max(least, 0.5 + 0.5 * math.cos(math.pi * share))
 
 
-def resume(run: Run, data: dict, network: torch.nn.Module, **more) -> dict:
+def resume(run: Run, task: Task, network: torch.nn.Module) -> dict:
     """Return the state that an earlier run left in the work folder, or the state before the first step.
 
     Raises Problem if the earlier run learnt from other data or had another configuration.
     """
     weights = network.state_dict()
-    begun = {"config": run.config, "data": data, "step": 0, "seconds": 0.0, "history": [], "network": weights}
-    begun |= {"optimiser": {}, "average": {name: value.clone() for name, value in weights.items()}, **more}
+    begun = {"config": run.config, "data": task.data, "step": 0, "seconds": 0.0, "history": [], "network": weights}
+    begun |= {"optimiser": {}, "average": {name: value.clone() for name, value in weights.items()}, **task.more}
     if not (run.work / STATE).is_file():
         return begun
     state = begun | read_state(run.work)  # a training begun by an older version lacks the newer entries
-    if state["data"] != data or state["config"] != run.config:
+    if state["data"] != task.data or state["config"] != run.config:
         raise Problem(
             f"The training in {run.work} is on other data or of another configuration.",
             "Name another --work folder, or delete this one.",
@@ -125,11 +126,11 @@ def read_state(work: Path) -> dict:
     return torch.load(work / STATE, weights_only=True, map_location="cpu")
 
 
-def descend(task: Task, recipe: Recipe, options: dict, run: Run, report: Reporter) -> None:
+def descend(network: torch.nn.Module, task: Task, recipe: Recipe, options: dict, run: Run, report: Reporter) -> None:
     """Train until the minutes are over; `options` are the configuration's. Reports progress in seconds."""
     # every configuration but `cpu` is for a graphics card
     device = "cuda" if run.config != "cpu" and torch.cuda.is_available() else "cpu"
-    state, network, total = task.state, task.network, 60 * (run.minutes or options["minutes"])
+    state, total = resume(run, task, network), 60 * (run.minutes or options["minutes"])
     network.load_state_dict(state["network"])
     network.to(device, memory_format=torch.channels_last)
     averaged = copy.deepcopy(network).eval()
@@ -138,13 +139,14 @@ def descend(task: Task, recipe: Recipe, options: dict, run: Run, report: Reporte
     if state["optimiser"]:
         optimiser.load_state_dict(state["optimiser"])
     steps, workers = range(state["step"], STEPS), options["workers"]
-    loader = DataLoader(task.batches, None, sampler=steps, num_workers=workers, prefetch_factor=3 if workers else None)
+    batches = Batches(task.draw, options["seed"], options.get("echo", 1))
+    loader = DataLoader(batches, None, sampler=steps, num_workers=workers, prefetch_factor=3 if workers else None)
     began, saved_at = time.monotonic() - state["seconds"], state["seconds"]
     for step, batch in zip(steps, loader, strict=False):
         share = min(1.0, state["seconds"] / total)
         for group in optimiser.param_groups:
             group["lr"] = options["rate"] * min(1.0, (step + 1) / recipe.warming) * recipe.fall(share)
-        value = task.loss(network, batch._make(part.to(device) for part in batch), step, share)
+        value = task.loss(network, batch._make(part.to(device) for part in batch), state, share)
         optimiser.zero_grad(set_to_none=True)
         value.backward()
         torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
@@ -158,7 +160,7 @@ def descend(task: Task, recipe: Recipe, options: dict, run: Run, report: Reporte
         if ended or state["seconds"] - saved_at > recipe.save_every:
             saved_at = state["seconds"]
             with torch.no_grad():
-                figures = task.measure(averaged)
+                figures = task.measure(averaged, state)
             state["history"].append([step + 1, round(saved_at), figures])
             report.log(f"step {step + 1}, {saved_at / 60:.1f} min, loss {value.item():.4f}, held out {figures}")
             state |= {"network": network.state_dict(), "optimiser": optimiser.state_dict()}

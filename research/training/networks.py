@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import torch
-from safetensors.torch import save_file
+from safetensors.torch import load_file, save_file
 
 from core.capture.files import replacing, write_json
 from core.capture.messages import Log, Reporter
@@ -20,19 +20,12 @@ from core.capture.shipped_files import CORE
 from .descent import Recipe, Run, Task, descend, read_state
 
 OPTIONS = {
-    "hdri": {
-        "type": Path,
-        "metavar": "FOLDER",
-        "help": "panoramas whose licence lets weights trained with them be shipped",
-    },
-    "skins": {"type": Path, "metavar": "FOLDER", "help": "skins that `carry` brought into our UVs"},
-    "held-out": {
-        "nargs": "+",
-        "default": (),
-        "metavar": "NAME",
-        "help": "skins of FOLDER that are kept from training, each with its cluster",
-    },
-    "start": {"type": Path, "metavar": "FILE", "help": "weights to begin with, in place of random ones"},
+    "hdri": dict(type=Path, metavar="FOLDER", help="panoramas whose licence lets weights trained with them be shipped"),
+    "skins": dict(type=Path, metavar="FOLDER", help="skins that `carry` brought into our UVs"),
+    "held-out": dict(
+        nargs="+", default=(), metavar="NAME", help="skins of FOLDER kept from training, each with its cluster"
+    ),
+    "start": dict(type=Path, metavar="FILE", help="weights to begin with, in place of random ones"),
 }
 """Options that only some trainings have."""
 
@@ -62,16 +55,18 @@ class Card:
 class Training:
     """A network that `python -m research.training NAME` trains.
 
-    prepare(run, report) makes what is kept in the work folder, and may be run alone; start(run, report) then opens the
-    data and the network; describe(state) returns the card's entries; options: of OPTIONS.
+    build(configuration) makes the network; prepare(run, options, report) makes what is kept in the work folder, and may
+    be run alone; start(run, options, report) then opens the data; describe(state) returns the card's entries; options:
+    of OPTIONS.
     """
 
     name: str
     configs: dict
     recipe: Recipe
-    start: Callable[[Run, Reporter], Task]
+    build: Callable[[dict], torch.nn.Module]
+    start: Callable[[Run, dict, Reporter], Task]
     describe: Callable[[dict], Card]
-    prepare: Callable[[Run, Reporter], None] | None = None
+    prepare: Callable[[Run, dict, Reporter], None] | None = None
     options: tuple[str, ...] = ()
 
 
@@ -96,7 +91,7 @@ def run_command(training: Training, description: str, arguments: list[str]) -> N
     if exports:
         export(training, run.work, run.out)
     elif prepares:
-        training.prepare(run, report)
+        training.prepare(run, training.configs[run.config]["training"], report)
     else:
         train(training, run, report)
 
@@ -116,10 +111,15 @@ def train(training: Training, run: Run, report: Reporter) -> dict:
     Raises Problem if the work folder holds a training on other data.
     """
     run.work.mkdir(parents=True, exist_ok=True)
+    config = training.configs[run.config]
+    options = config["training"]
     if training.prepare:
-        training.prepare(run, report)
-    task = training.start(run, report)
-    descend(task, training.recipe, training.configs[run.config]["training"], run, report)
+        training.prepare(run, options, report)
+    torch.manual_seed(options["seed"])
+    network = training.build(config)
+    if run.start:
+        network.load_state_dict({name: value.float() for name, value in load_file(run.start).items()})
+    descend(network, training.start(run, options, report), training.recipe, options, run, report)
     return export(training, run.work, run.out)
 
 

@@ -22,7 +22,7 @@ from core.solver.prior.network import UNet, denoise
 from core.solver.prior.prior import BLIND_SIGMA, build_network, make_condition, pack_maps
 from core.stages.solve.prior_files import fast_dtype
 
-from .descent import Batches, Recipe, Run, Task, resume
+from .descent import Recipe, Run, Task
 from .networks import Card, Training
 from .patches import PatchBatch, Windows, mean_map, reference_skins, spread_about
 from .seeds import named_subjects
@@ -68,10 +68,8 @@ they must follow from the diffuse, of which more is then to be seen (ln sigma lo
 CLEARER = 1.5
 
 
-def start(run: Run, report: Reporter) -> Task:
-    """Open the windows, the network and the statistics that it is built around."""
-    config = CONFIGS[run.config]
-    options = config["training"]
+def start(run: Run, options: dict, report: Reporter) -> Task:
+    """Open the windows, and measure the statistics that the network is built around."""
     data = named_data(options, run.skins, run.held_out)
     skins = synthetic_skins(data["seeds"], run.work, report)
     unseen = {"synthetic": synthetic_skins(data["held_out_seeds"], run.work, report)}
@@ -85,25 +83,20 @@ def start(run: Run, report: Reporter) -> Task:
         for kind, other in unseen.items()
         if other.names
     }
-    torch.manual_seed(options["seed"])
-    network = build_network(config)
-    state = resume(
-        run,
-        data,
-        network,
-        tones=skins.tones.tolist(),
-        references=reference_skins(skins),
-        statistics={"mean_face": mean, "spread": spread_about(windows, mean, patch)},
-    )
-    statistics = state["statistics"]
 
-    def step_loss(network: UNet, batch: PatchBatch, step: int, share: float) -> torch.Tensor:
-        return loss(network, statistics, batch, np.random.default_rng((options["seed"], step, 1))).mean()
+    def step_loss(network: UNet, batch: PatchBatch, state: dict, share: float) -> torch.Tensor:
+        rng = np.random.default_rng((options["seed"], state["step"], 1))
+        return loss(network, state["statistics"], batch, rng).mean()
 
-    def measure(network: UNet) -> dict:
-        return {kind: _measure_scales(network, statistics, batch) for kind, batch in held_out.items()}
+    def measure(network: UNet, state: dict) -> dict:
+        return {kind: _measure_scales(network, state["statistics"], batch) for kind, batch in held_out.items()}
 
-    return Task(network, state, Batches(partial(_draw_step, windows, options), options["seed"]), step_loss, measure)
+    more = {
+        "tones": skins.tones.tolist(),
+        "references": reference_skins(skins),
+        "statistics": {"mean_face": mean, "spread": spread_about(windows, mean, patch)},
+    }
+    return Task(data, partial(_draw_step, windows, options), step_loss, measure, more)
 
 
 def describe(state: dict) -> Card:
@@ -196,6 +189,7 @@ TRAINING = Training(
         averaging=0.9995,
         save_every=120,
     ),
+    build_network,
     start,
     describe,
     options=("skins", "held-out"),

@@ -22,7 +22,7 @@ from core.capture.messages import Reporter
 from core.face.parser_network import ParseNet
 
 from ..people.environments import read_panoramas
-from .descent import Batches, Recipe, Run, Task, cosine, resume
+from .descent import Recipe, Run, Task, cosine
 from .networks import Card, Training
 from .seeds import named_subjects, panorama_names
 from .sights import SightStore, Source, stack_examples
@@ -78,34 +78,32 @@ class Reader:
     measured: str
 
     def training(self) -> Training:
-        return Training(self.name, self.configs, RECIPE, self.start, self.describe, self.prepare, ("hdri",))
+        return Training(self.name, self.configs, RECIPE, self.build, self.start, self.describe, self.prepare, ("hdri",))
 
-    def open(self, run: Run) -> tuple[SightStore, dict]:
+    def build(self, config: dict) -> ParseNet:
+        return ParseNet(**config["model"], parts=self.classes)
+
+    def open(self, run: Run, options: dict) -> tuple[SightStore, dict]:
         """Return the store of the figures' sights, and the names of the data."""
-        options = self.configs[run.config]["training"]
         data = named_subjects(options["figures"], options["held_out"]) | {"panoramas": panorama_names(run.hdri)}
         return SightStore(run.work, "figure", self.count(options)), data
 
-    def prepare(self, run: Run, report: Reporter) -> None:
+    def prepare(self, run: Run, options: dict, report: Reporter) -> None:
         """Make the sights of all figures, those of the held-out ones first."""
-        store, data = self.open(run)
+        store, data = self.open(run, options)
         store.prepare(data["held_out_seeds"] + data["seeds"], self.make_sights, report)
 
-    def start(self, run: Run, report: Reporter) -> Task:
-        """Open the photographs and the network."""
-        config = self.configs[run.config]
-        options, (store, data) = config["training"], self.open(run)
+    def start(self, run: Run, options: dict, report: Reporter) -> Task:
+        """Open the photographs."""
+        store, data = self.open(run, options)
         source = Source(store, data["seeds"], self.shoot, read_panoramas(run.hdri))
         unseen = replace(source, seeds=data["held_out_seeds"])
         held_out = draw(unseen, self.crops * options["held_out"], 1, np.random.default_rng(1), augment=False)[0]
-        torch.manual_seed(options["seed"])
-        network = ParseNet(**config["model"], parts=self.classes)
         return Task(
-            network,
-            resume(run, data, network),
-            Batches(partial(_draw_step, source, options), options["seed"], options["echo"]),
-            lambda network, batch, step, share: self.loss(network, batch),
-            lambda network: self.measure(network, held_out),
+            data,
+            partial(_draw_step, source, options),
+            lambda network, batch, state, share: self.loss(network, batch),
+            lambda network, state: self.measure(network, held_out),
         )
 
     def loss(self, network: torch.nn.Module, batch: LabelBatch) -> torch.Tensor:

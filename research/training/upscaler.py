@@ -16,7 +16,7 @@ from core.capture.messages import Reporter
 from core.solver.upsampling.network import BICUBIC_ERRORS, Rcan, bicubic
 from core.stages.solve.prior_files import fast_dtype
 
-from .descent import Batches, Recipe, Run, Task, cosine, resume
+from .descent import Recipe, Run, Task, cosine
 from .fine_windows import FineWindows, WindowBatch, prepare
 from .networks import Card, Training
 from .seeds import named_subjects
@@ -49,28 +49,22 @@ KEPT = 3
 little."""
 
 
-def prepare_windows(run: Run, report: Reporter) -> None:
+def prepare_windows(run: Run, options: dict, report: Reporter) -> None:
     """Paint the windows of all subjects."""
-    options = CONFIGS[run.config]["training"]
     data = named_subjects(options["skins"], options["held_out"])
     prepare(data["seeds"] + data["held_out_seeds"], options["views"], run.work, report, max(2, options["workers"]))
 
 
-def start(run: Run, report: Reporter) -> Task:
-    """Open the windows and the network."""
-    config = CONFIGS[run.config]
-    options = config["training"]
+def start(run: Run, options: dict, report: Reporter) -> Task:
+    """Open the windows."""
     data = named_subjects(options["skins"], options["held_out"])
     windows, unseen = (FineWindows(data[kind], options["views"], run.work) for kind in ("seeds", "held_out_seeds"))
     held_out = unseen.draw(4 * options["held_out"], options["patch"], np.random.default_rng(1))
-    torch.manual_seed(options["seed"])
-    network = Rcan(**config["model"])
     return Task(
-        network,
-        resume(run, data, network),
-        Batches(partial(_draw_step, windows, options), options["seed"]),
-        lambda network, batch, step, share: loss(network, batch, max(g for g in GROWTH if g[0] <= share)[1]).mean(),
-        lambda network: measure(network, held_out),
+        data,
+        partial(_draw_step, windows, options),
+        lambda network, batch, state, share: loss(network, batch, max(g for g in GROWTH if g[0] <= share)[1]).mean(),
+        lambda network, state: measure(network, held_out),
     )
 
 
@@ -122,6 +116,7 @@ TRAINING = Training(
     "upscaler",
     CONFIGS,
     Recipe(100, cosine(0.01), (0.9, 0.99), weight_decay=1e-4, averaging=0.995, save_every=180),
+    lambda config: Rcan(**config["model"]),
     start,
     describe,
     prepare_windows,

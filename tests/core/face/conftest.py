@@ -43,6 +43,6 @@ def eyes_work(scene, tmp_path_factory):
         patched.setitem(eyes.CONFIGS, "cpu", {"model": TINY, "training": options})
         patched.setattr(eyes, "make_figure", lambda person, texels: made.append(person) or scene.figure)
         for _ in range(2):
-            eyes.READER.prepare(Run("cpu", folder, folder), Reporter("train", emit=lambda message: None))
+            eyes.READER.prepare(Run("cpu", folder, folder), options, Reporter("train", emit=lambda message: None))
     assert len(made) == 2, "figures that are there are not made again"
     return folder
