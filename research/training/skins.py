@@ -192,7 +192,7 @@ def _read(paths: list[Path], names: list[str], learnable: np.ndarray | None) -> 
 
 
 def facial_skin(size: int) -> np.ndarray:
-    """Return the skin of the face [S, S], without lips and brows, in [0, 1]."""
+    """Return the facial skin [S, S], in [0, 1]."""
     return template.mask("skin", size) * template.mask("face", size) * (1 - template.mask("eyes", size))
 
 
