@@ -59,13 +59,13 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
         description="Folder of Install Solver's packages; empty: .wildcap/solver in your home folder",
     )
     compute: bpy.props.EnumProperty(
-        name="Compute On",
+        name="Hardware",
         items=COMPUTES,
         default='auto',
         description="Hardware that Install Solver downloads PyTorch for",
     )
     packages: bpy.props.EnumProperty(
-        name="Packages From", items=SOURCES, default='pytorch', description="Source of Install Solver's downloads"
+        name="Package Source", items=SOURCES, default='pytorch', description="Source of Install Solver's downloads"
     )
     wheels: bpy.props.StringProperty(
         name="Wheels",
@@ -111,7 +111,8 @@ def draw_solver(layout, preferences) -> None:
             layout.label(text=preferences.device_reason, translate=False)
     else:
         layout.label(
-            text="The solver is ready" if ready else "There is no solver yet", icon='CHECKMARK' if ready else 'INFO'
+            text="The solver is ready" if ready else "The solver is not installed",
+            icon='CHECKMARK' if ready else 'INFO',
         )
     if ready and preferences.tested:
         layout.label(text=preferences.tested, translate=False, icon='CHECKMARK')

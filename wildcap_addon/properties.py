@@ -167,7 +167,7 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
         description="The light for Render",
     )
     hdri: bpy.props.EnumProperty(
-        name="Surroundings",
+        name="Environment",
         items=worlds.items,
         description="Blender's own worlds, and those installed in its preferences (Lights)",
     )
@@ -223,7 +223,7 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
         ],
     )
     turns: bpy.props.EnumProperty(
-        name="Turns",
+        name="Rotate",
         default='HEAD',
         description="What goes once around",
         items=[
@@ -235,7 +235,7 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
         name="Frames", min=2, max=1000, default=48, description="Pictures of one turn; a video plays 24 per second"
     )
     turn_file: bpy.props.EnumProperty(
-        name="As",
+        name="Format",
         default='MP4',
         description="Format of renders/turntable",
         items=[('MP4', "Video", "One MP4"), ('PNG', "Pictures", "A PNG per frame")],

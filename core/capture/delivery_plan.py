@@ -175,7 +175,7 @@ def check_target(plan: DeliveryPlan) -> None:
     delivered = read_delivered(target)
     if delivered is None:
         raise Problem(
-            f"{target} contains files that no delivery has put there.",
+            f"{target} contains files that WildCap did not deliver.",
             "Move them away, or choose another folder to deliver to.",
         )
     capture = _read_provenance(target).get("capture")
@@ -200,7 +200,7 @@ def check_target(plan: DeliveryPlan) -> None:
     blocked = sorted(name for name in new - delivered.keys() if (target / name).exists())
     if blocked:
         raise Problem(
-            f"Files in {target} are in the way, which no delivery has put there: {name_some(blocked)}.",
+            f"Files in {target} are in the way and were not delivered by WildCap: {name_some(blocked)}.",
             "Move them to another folder, or deliver to another one.",
         )
 

@@ -94,7 +94,7 @@ CARDS = {
         "The published delighting network of the paper OpenDelight, where you have its weights.",
         best_for="Comparing, and whoever has the weights.",
         runs="On your machine; a GPU is of great help.",
-        weights="Yours to bring: the folder with the authors' two files. It was not verified on real weights.",
+        weights="You provide them: the folder with the authors' two files. It was not verified on real weights.",
         licence="Our code GPL-3.0-or-later; the weights are under their authors' terms.",
         settings=("checkpoint",),
         needed=(("checkpoint", "The folder with OpenDelight's two files is not chosen."),),

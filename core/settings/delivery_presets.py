@@ -91,7 +91,7 @@ FORMATS = {
         ".obj",
         (
             "OBJ has no shape keys and no units.",
-            "Its MTL has no subsurface scattering, and says of no map that it is no colour: "
+            "Its MTL has no subsurface scattering, and cannot mark maps as non-colour data: "
             "in Blender set all but the albedo to Non-Color.",
         ),
         shape_keys=False,

@@ -141,7 +141,7 @@ class SolveSettings:
     prior: str = setting("", path="folder", flag="--prior", holds=("config.json", "ckpt.pth"))
     """The authors' prior: the folder with its config.json and ckpt.pth. It needs ICT-FaceKit fitted as template, in
     whose UVs it works; empty: ours"""
-    together: str = setting("", path="folder", label="Together With", flag="--with")
+    together: str = setting("", path="folder", label="Other Captures", flag="--with")
     """Another capture of the same person in other light, or a folder of several: what they agree on is skin, what
     differs is light. Empty: alone"""
     checkpoint_every: int = setting(5, min=1, max=600, affects_result=False)
@@ -200,9 +200,9 @@ class DeliverSettings:
     """Whether the maps' names carry the number of their UV tile (1001); maps of several tiles always do"""
     hair: bool = setting(True, label="Hair Masks", flag="--no-hair")
     """Masks of brows, lashes and beard and the skin below them go along, where the capture has them"""
-    clean: bool = setting(False, label="Clean Skin", flag="--clean")
+    clean: bool = setting(False, label="Skin Without Hair", flag="--clean")
     """The albedo without brows, lashes and beard, to groom hair over it, in place of the one with them"""
-    folder: str = setting("", path="folder", label="Deliver To", flag="--to", affects_result=False)
+    folder: str = setting("", path="folder", label="Output Folder", flag="--to", affects_result=False)
     """Folder to deliver to; empty: exports in the capture's folder"""
     roughness: int = setting(45, min=0, max=100, unit="percent")
     """Roughness of the cheeks, in the maps and materials that hold it; Blender puts in what the head's material has"""

@@ -194,7 +194,7 @@ class WILDCAP_OT_accept_mask(MaskWalk, bpy.types.Operator):
         if next_face is not None:
             walking.go(context, next_face)
         else:
-            self.report({'INFO'}, rpt_("All masks have been looked at: click Solve All"))
+            self.report({'INFO'}, rpt_("All masks reviewed: click Solve All"))
 
 
 CLASSES = (

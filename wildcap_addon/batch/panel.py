@@ -41,7 +41,7 @@ class WILDCAP_PT_batch(WildcapPanel, bpy.types.Panel):
             return
         problems.draw_text(layout, count_words(view), width)
         if not batches.waiting() and batches.ready() and not running.running():
-            layout.label(text="All masks have been looked at", icon='CHECKMARK')
+            layout.label(text="All masks reviewed", icon='CHECKMARK')
             layout.operator("wildcap.solve_all", icon='LIGHT')
         else:
             column = layout.column(align=True)

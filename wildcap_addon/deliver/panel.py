@@ -36,7 +36,7 @@ class WILDCAP_PT_deliver(CapturePanel, bpy.types.Panel):
         if waiting.last(root) is not None:
             layout.operator("wildcap.open_delivery", icon='FILE_FOLDER')
         header, body = layout.panel("wildcap_deliver_drops", default_closed=False)
-        header.label(text="What This Drops")
+        header.label(text="Not Included")
         left_out = stand.left_behind(captures.head(context, item), settings.what, chosen.suffix)
         for sentence in (*chosen.drops, *left_out) if body else ():
             problems.draw_text(body, sentence, region_width(context), 'INFO')
@@ -46,7 +46,7 @@ class WILDCAP_PT_deliver(CapturePanel, bpy.types.Panel):
             body.prop(settings, name)
         draw_settings(layout, item, stages.by_name("transfer"))
         if settings.what != "head":
-            layout.operator("wildcap.reconstruct", text="Make My Mesh and Scan", icon='FILE_REFRESH').to_end = True
+            layout.operator("wildcap.reconstruct", text="Make Own Mesh and Scan", icon='FILE_REFRESH').to_end = True
 
 
 CLASSES = (WILDCAP_PT_deliver,)

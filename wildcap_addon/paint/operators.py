@@ -81,7 +81,7 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
             ('INVERT', "Invert", "Shadow where there was none"),
             ('CLEAR', "Clear", "No shadow anywhere"),
             ('PROPOSAL', "Back to Proposal", "Start again from the proposed mask"),
-            ('SNAPPED', "Take Snapped Mask", "Your mask, aligned with the shadow's edges"),
+            ('SNAPPED', "Use Snapped Mask", "Your mask, aligned with the shadow's edges"),
         ],
     )
 

@@ -56,9 +56,9 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
                 column.prop(item.shadow_mask, "softened", text="")
             offer = session.offered()
             if offer == 'SNAPPED':
-                take = layout.operator("wildcap.edit_mask", text="Take Snapped Mask", icon='CHECKMARK', depress=True)
+                take = layout.operator("wildcap.edit_mask", text="Use Snapped Mask", icon='CHECKMARK', depress=True)
                 take.kind = offer
-            text = "Take Detected Mask" if offer == 'PROPOSAL' else "Back to Proposal"
+            text = "Use Detected Mask" if offer == 'PROPOSAL' else "Back to Proposal"
             back = layout.operator("wildcap.edit_mask", text=text, icon='LOOP_BACK', depress=offer == 'PROPOSAL')
             back.kind = 'PROPOSAL'
 

@@ -36,7 +36,7 @@ def draw(layout, item, width: int) -> None:
     problems.draw_text(box, card.what, width)
     _draw_facts(box, card, width, folded=False)
     header, more = layout.panel("wildcap_card", default_closed=True)
-    header.label(text="More About It")
+    header.label(text="Details")
     if more:
         _draw_facts(more, card, width, folded=True)
     column = layout.column()

@@ -97,7 +97,7 @@ class WILDCAP_OT_use_built_in_head(BaseOperator, bpy.types.Operator):
     """Fit only the built-in head."""
 
     bl_idname = "wildcap.use_built_in_head"
-    bl_label = "Built-In Head Alone"
+    bl_label = "Use Built-In Head Only"
     bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod

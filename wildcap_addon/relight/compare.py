@@ -14,7 +14,7 @@ ALBEDO = material.IMAGES[0][0]
 SHOWN = {
     'FILMED': ("As Filmed", "filmed.png", "The texture with all of its light, as it was filmed"),
     'DELIT': ("Delit", "delit.png", "The texture that the delighter left, with the shadows that stayed in it"),
-    'SOLVED': ("Albedo", "diffuse_albedo.png", "What the solver found"),
+    'SOLVED': ("Albedo", "diffuse_albedo.png", "Solved albedo"),
     'SKIN': (
         "Skin Below Hair",
         "clean_albedo.png",

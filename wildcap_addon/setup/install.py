@@ -119,7 +119,7 @@ def chosen_packages() -> tuple[str, str, Path | None]:
     source = preferences.get().packages
     if source != 'folder':
         preferences.require_online(
-            "choose A Folder of Wheels under Packages From, or use a Python that has the packages already"
+            "choose A Folder of Wheels under Package Source, or use a Python that has the packages already"
         )
     return pip_steps.compute_of(preferences.get().compute), source, preferences.wheels_folder()
 

@@ -91,7 +91,7 @@ class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
             bpy.data.images.remove(image)
         if colour.max() > BURNT_SRGB or colour.min() < BLACK_SRGB:
             raise Problem(
-                "The card is burnt out or black there.",
+                "The card is overexposed or black there.",
                 "Choose another frame or place, or a grey card instead of white paper.",
             )
         set_white(captures.root(item), (colours.srgb_to_linear(colour) / CARDS[self.card]).tolist())

@@ -81,7 +81,7 @@ def measure_card_white(srgb: np.ndarray, column: float, row: float, card: str) -
     patch = srgb[top : int(row) + reach + 1, left : int(column) + reach + 1].reshape(-1, 3)
     if np.median(patch, 0).max() >= 0.98 or np.median(patch, 0).min() < 0.03:
         raise Problem(
-            "The card is burnt out or black there.",
+            "The card is overexposed or black there.",
             "Choose another frame or place, or a grey card instead of white paper.",
         )
     linear = images.srgb_to_linear(patch)

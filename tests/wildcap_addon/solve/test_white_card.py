@@ -44,7 +44,7 @@ def test_a_click_on_a_card_gives_the_white_point_and_the_cross_takes_it_away(add
 @pytest.mark.parametrize(
     ("frame", "uv", "words"),
     [
-        ("00000.jpg", (0.5, 0.2), "burnt out"),
+        ("00000.jpg", (0.5, 0.2), "overexposed"),
         ("00000.jpg", (1.2, 0.2), "outside"),
         ("00009.jpg", (0.5, 0.7), "no such"),
     ],

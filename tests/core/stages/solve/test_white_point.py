@@ -92,7 +92,7 @@ def test_a_card_that_is_pointed_at_gives_its_light(tmp_path, capsys, card, refle
     ("where", "colour", "said"),
     [
         ((900, 20), 0.5, "outside of the frame"),
-        ((20, 20), 1.0, "burnt out or black"),
+        ((20, 20), 1.0, "overexposed or black"),
         ((20, 20), None, "not of one colour"),
     ],
 )
