@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What only some faces have: scars, and make-up on lips, lids, lashes and cheeks."""
+"""Scars, and make-up on lips, lids, lashes and cheeks."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ SHADOWS = np.array([[0.10, 0.06, 0.05], [0.05, 0.04, 0.06], [0.20, 0.11, 0.08], 
 
 
 class Scars(NamedTuple):
-    """What scars add, float32 [N] each: to the logarithms of melanin (stain) and of blood (flush), and to the height in
-    mm (ridge)."""
+    """Effect of scars, float32 [N]: on the logarithms of melanin (stain) and blood (flush), on height in mm (ridge)."""
 
     stain: np.ndarray
     flush: np.ndarray
@@ -29,14 +28,9 @@ class Scars(NamedTuple):
 
 
 def paint_scars(on: Canvas, ground: Canvas, expected: float, rng: np.random.Generator) -> Scars:
-    """Thin lines of 4 to 20 mm on the bare skin of face and neck, old ones pale, young ones red, sunken or raised.
+    """Draw scars: thin lines of 4 to 20 mm on bare face and neck, old pale ones and young red ones.
 
-    Parameters
-    ----------
-    on : what is painted on
-    ground : of the same head, GROUND texels wide: where they begin
-    expected : their mean number
-    rng : draws them
+    They begin on `ground`, GROUND texels wide, of the same head; `expected` is their mean number.
     """
     nothing = np.zeros(len(on.position), np.float32)
     if expected <= 0:
@@ -60,7 +54,7 @@ def paint_scars(on: Canvas, ground: Canvas, expected: float, rng: np.random.Gene
 
 
 def lid_distance(on: Canvas) -> np.ndarray:
-    """Closeness [N] in [0, 1] to the line where the lids meet: 1 on it, 0 from about 2 mm on."""
+    """Return closeness [N] in [0, 1] to the line where the lids meet: 1 on it, 0 from about 2 mm on."""
     if "lid line" not in on.cache:
         lids = lid_lines(on)
         on.cache["lid line"] = splat_spots(on, lids, np.full(len(lids), 1.0), np.ones(len(lids)))
@@ -70,19 +64,9 @@ def lid_distance(on: Canvas) -> np.ndarray:
 def put_on_make_up(
     diffuse: np.ndarray, area: dict[str, np.ndarray], lids: np.ndarray, amount: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Each of lipstick, eye shadow, liner and blusher is worn or not, at random.
+    """Paint lipstick, eye shadow, liner and blusher, each worn or not, on the linear albedo [N, 3].
 
-    Parameters
-    ----------
-    diffuse : [N, 3], linear albedo
-    area : `regions` of the canvas
-    lids : [N], `lid_distance` of the canvas
-    amount : in [0, 1], strength at most; 0 is none
-    rng : what is worn, how strong and of which colour
-
-    Returns
-    -------
-    [N, 3], linear albedo.
+    area: the canvas's `regions`; lids [N]: its `lid_distance`; amount in [0, 1]: maximum strength.
     """
     if amount <= 0:
         return diffuse
@@ -99,7 +83,7 @@ def put_on_make_up(
 
 
 def _coat(below: np.ndarray, colour: np.ndarray, cover: np.ndarray) -> np.ndarray:
-    """A thin coat of `colour` [3] over `below` [N, 3]: what lies below shines through, so pores and creases stay."""
+    """Cover `below` [N, 3] with a thin coat of `colour` [3], through which pores and creases show."""
     relief = np.clip(
         below.mean(-1, keepdims=True) / max(float(np.average(below.mean(-1), weights=cover + 1e-6)), 1e-4), 0.5, 1.5
     )

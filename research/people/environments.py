@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Environments around a portrait: panoramas (HDRI), or made ones of sky, ground, walls, windows and lamps, as radiance
-from olat.DIRECTIONS.
+"""Environments of a portrait as radiance from olat.DIRECTIONS: panoramas (HDRI), or made ones.
 
-A panorama's sun is taken out of it and handed on by itself, as the lights of the stage are too few to make its shadow's
-edge.
+Made ones have sky, ground, walls, windows and lamps. A panorama's sun is taken out of it and handed on by itself, as
+the lights of the stage are too few for its shadow's edge.
 """
 
 from __future__ import annotations
@@ -17,8 +16,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from core.imaging import images
+from core.light.spherical_harmonics import LAMBERT, per_function, sh_basis
 
-from .olat import DIRECTIONS
+from .olat import BASIS, DIRECTIONS, LIGHTS
 
 WIDTH = 128  # of a panorama kept for backgrounds
 SUN_OVER_MEAN = 25.0  # radiance, in means of the panorama, over which a texel is a lamp or the sun
@@ -26,26 +26,46 @@ SUN_OVER_MEAN = 25.0  # radiance, in means of the panorama, over which a texel i
 
 @dataclass(frozen=True)
 class Environment:
-    """radiance float32 [LIGHTS, 3], linear, of mean luminance 1; lamp unit [3] towards what shines hardest and its
-    colour [3] as irradiance over pi (zeros: none); panorama float32 [WIDTH / 2, WIDTH, 3]: what the background
-    shows."""
+    """Light from all directions.
+
+    radiance float32 [LIGHTS, 3], linear, of mean luminance 1; lamp unit [3] towards the brightest light and its colour
+    [3] as irradiance over pi (zeros: none); panorama float32 [WIDTH / 2, WIDTH, 3]: the background.
+    """
 
     radiance: np.ndarray
     lamp: np.ndarray
     colour: np.ndarray
     panorama: np.ndarray
 
+    @property
+    def sky(self) -> np.ndarray:
+        """Coefficients [9, 3] of the radiance in spherical harmonics."""
+        return BASIS.T @ self.radiance * (4 * np.pi / LIGHTS)
+
+
+def irradiance(directions: np.ndarray, sky: np.ndarray) -> np.ndarray:
+    """Return irradiance / pi [..., 3] on surfaces that face unit directions [..., 3]; float32."""
+    return (sh_basis(directions) * np.float32(per_function(LAMBERT))) @ sky
+
+
+def random_environment(panoramas: list[np.ndarray], rng: np.random.Generator) -> Environment:
+    """Draw one of the panoramas in six cases of ten, a made environment in the others or without any."""
+    if len(panoramas) and rng.random() < 0.6:
+        return panorama_environment(panoramas[rng.integers(len(panoramas))], rng)
+    return made_environment(rng)
+
 
 def read_panoramas(folder: Path | None) -> list[np.ndarray]:
-    """The equirectangular panoramas (.hdr, .exr) of a folder, linear [128, 256, 3], in order of their names; none
-    without a folder."""
+    """Read the equirectangular panoramas (.hdr, .exr) of a folder by name, linear [128, 256, 3].
+
+    None without a folder.
+    """
     paths = sorted(p for p in Path(folder).iterdir() if p.suffix.lower() in (".hdr", ".exr")) if folder else []
     return [np.maximum(images.resize(images.read_linear(path), 256, 128), 0) for path in paths]
 
 
 def panorama_environment(panorama: np.ndarray, rng: np.random.Generator) -> Environment:
-    """A panorama turned about the vertical, at random. Its middle column is straight ahead of the face (-Y), +Z is
-    up."""
+    """Return a panorama turned about the vertical at random; its middle column is ahead of the face (-Y)."""
     turned = np.roll(panorama, rng.integers(panorama.shape[1]), 1)
     if rng.random() < 0.5:
         turned = turned[:, ::-1]
@@ -56,8 +76,10 @@ def panorama_environment(panorama: np.ndarray, rng: np.random.Generator) -> Envi
 
 
 def without_lamp(panorama: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A panorama [H, W, 3] without what is brighter than SUN_OVER_MEAN; the unit direction [3] from which that shines,
-    and its colour [3] as irradiance over pi (zeros: nothing is)."""
+    """Remove from a panorama [H, W, 3] the light above SUN_OVER_MEAN.
+
+    Returns the rest, the unit direction [3] of that light, and its colour [3] as irradiance over pi (zeros: none).
+    """
     solid, directions = solid_angles(*panorama.shape[:2]), panorama_directions(*panorama.shape[:2])
     luminance = panorama.mean(-1)
     mean = (luminance * solid).sum() / solid.sum()
@@ -72,7 +94,7 @@ def without_lamp(panorama: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 
 def made_environment(rng: np.random.Generator) -> Environment:
-    """Sky above, ground below, walls and windows of all colours, few or many; no panorama needed."""
+    """Make an environment of sky, ground, walls and windows of all colours, without a panorama."""
     directions = panorama_directions(WIDTH // 2, WIDTH)
     height = directions[..., 2]
     sky, ground = _colour(rng, 0.25) * np.exp(rng.normal(0, 0.6)), _colour(rng, 0.4) * np.exp(rng.normal(-0.9, 0.7))
@@ -89,7 +111,7 @@ def made_environment(rng: np.random.Generator) -> Environment:
 
 
 def background_radiance(environment: Environment, directions: np.ndarray) -> np.ndarray:
-    """The background's radiance [..., 3] in unit directions [..., 3]."""
+    """Return the background's radiance [..., 3] in unit directions [..., 3]."""
     height, width = environment.panorama.shape[:2]
     column = (0.5 + np.arctan2(directions[..., 0], -directions[..., 1]) / (2 * np.pi)) * width
     row = np.arccos(np.clip(directions[..., 2], -1, 1)) / np.pi * height
@@ -113,7 +135,7 @@ def _normalised(radiance: np.ndarray, lamp: np.ndarray, colour: np.ndarray, pano
 
 
 def _gathered(panorama: np.ndarray) -> np.ndarray:
-    """Mean radiance [LIGHTS, 3] of the part of a panorama that is nearest to each light."""
+    """Return the mean radiance [LIGHTS, 3] of the part of a panorama that is nearest to each light."""
     height, width = panorama.shape[:2]
     if height > WIDTH // 2:
         height, width = WIDTH // 2, WIDTH
@@ -127,7 +149,7 @@ def _gathered(panorama: np.ndarray) -> np.ndarray:
 
 
 def panorama_directions(height: int, width: int) -> np.ndarray:
-    """Unit directions [H, W, 3] of an equirectangular panorama's texels."""
+    """Return unit directions [H, W, 3] of an equirectangular panorama's texels."""
     polar = (np.arange(height) + 0.5)[:, None] / height * np.pi
     azimuth = ((np.arange(width) + 0.5)[None] / width - 0.5) * 2 * np.pi
     return np.stack(
@@ -136,13 +158,13 @@ def panorama_directions(height: int, width: int) -> np.ndarray:
 
 
 def solid_angles(height: int, width: int) -> np.ndarray:
-    """Steradians [H, W] of an equirectangular panorama's texels."""
+    """Return steradians [H, W] of an equirectangular panorama's texels."""
     polar = (np.arange(height) + 0.5)[:, None] / height * np.pi
     return np.broadcast_to(np.sin(polar) * (np.pi / height) * (2 * np.pi / width), (height, width))
 
 
 def _colour(rng: np.random.Generator, spread: float) -> np.ndarray:
-    """A light's colour [3] of mean about 1: warm or cool, a little green or magenta."""
+    """Draw a light's colour [3] of mean about 1: warm or cool, a little green or magenta."""
     warm, green = rng.normal(0, spread), rng.normal(0, 0.25 * spread)
     return np.exp([0.6 * warm, green, -warm])
 

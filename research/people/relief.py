@@ -10,7 +10,7 @@ from .canvas import Canvas
 
 
 def normals(height: np.ndarray, on: Canvas) -> np.ndarray:
-    """Unit normals float32 [N, 3] (x along +u, y along +v: OpenGL) of a height [N] in mm over the smooth surface.
+    """Return unit normals float32 [N, 3] (x along +u, y along +v: OpenGL) of a height [N] in mm over the surface.
 
     The slope is measured along the surface through the UV's metric, with one-sided differences at the charts' borders.
     """

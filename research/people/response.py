@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From scene radiance to the file a phone writes: exposure, white balance, tone curve, clipping, blur, noise and
-compression."""
+"""Scene radiance to the file a phone writes: exposure, white balance, tone curve, blur, noise and compression."""
 
 from __future__ import annotations
 
@@ -12,7 +11,7 @@ from core.imaging import images
 
 
 def expose(radiance: np.ndarray, metered_on: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Linear radiance [S, S, 3] as the sensor takes it, clipped to [0, 1], and the factor [3] it was multiplied by.
+    """Return linear radiance [S, S, 3] as the sensor takes it, clipped to [0, 1], and the gain [3] applied.
 
     Metered on the pixels `metered_on` bool [S, S] and on the whole picture in random parts; the white balance forgives
     most of the light's colour, not all.
@@ -33,7 +32,7 @@ def expose(radiance: np.ndarray, metered_on: np.ndarray, rng: np.random.Generato
 
 
 def curve(linear: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Linear [..., 3] to sRGB under a camera's own taste: contrast about the middle and saturation, mild."""
+    """Encode linear [..., 3] as sRGB with a camera's own mild contrast about the middle and saturation."""
     srgb = images.linear_to_srgb(linear)
     contrast, lift = rng.normal(0, 0.25), rng.normal(0, 0.02)
     srgb = srgb + contrast * srgb * (1 - srgb) * (2 * srgb - 1) + lift * (1 - srgb)
@@ -42,8 +41,7 @@ def curve(linear: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def develop(srgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """A clean sRGB picture [S, S, 3] blurred, sharpened, noisy and compressed, as bytes would hold it; float32 in [0,
-    1]."""
+    """Blur, sharpen, add noise to and compress an sRGB picture [S, S, 3]; float32 in [0, 1], of bytes."""
     if rng.random() < 0.6:
         srgb = cv2.GaussianBlur(srgb, (0, 0), rng.uniform(0.3, 1.1))
     if rng.random() < 0.3:

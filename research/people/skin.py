@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A procedural skin with known truth in the template's UV layout: a seed goes in, diffuse albedo, specular albedo,
-height and normals come out.
+"""A procedural skin of known truth in the template's UV layout: a seed gives albedos, height and normals.
 
 The colour is that of melanin and blood (pigment.py), varied over regions, blotches, mottling and marks; pores, creases,
 moles and hairs act on colour, gloss and height together, as they do on a face.
@@ -27,9 +26,12 @@ GROUND = 512  # size of the canvas on which marks are strewn, whatever the size 
 
 @dataclass(frozen=True)
 class Skin:
-    """All float32. diffuse [S, S, 3]: albedo, linear sRGB; specular [S, S]: Principled BSDF's Specular IOR Level (0.35
-    is the 2.8 % of skin); height [S, S] in mm over the smooth head; normal [S, S, 3]: unit, tangent space, OpenGL Y+
-    (not packed into [0, 1]); covered bool [S, S]: texels of the head (the rest is bled)."""
+    """Maps of a skin, float32.
+
+    diffuse [S, S, 3]: albedo, linear sRGB; specular [S, S]: Principled BSDF's Specular IOR Level (0.35 is the 2.8 % of
+    skin); height [S, S] in mm over the smooth head; normal [S, S, 3]: unit, tangent space, OpenGL Y+ (not packed into
+    [0, 1]); covered bool [S, S]: texels of the head (the rest is bled).
+    """
 
     diffuse: np.ndarray
     specular: np.ndarray
@@ -39,8 +41,7 @@ class Skin:
 
 
 def make_skin(parameters: SkinParameters | int, size: int = 1024) -> Skin:
-    """The skin of these parameters, or of those that a seed stands for. The same parameters and size give the same
-    bytes."""
+    """Make the skin of parameters or of a seed; the same parameters and size give the same bytes."""
     if not isinstance(parameters, SkinParameters):
         parameters = sample_parameters(parameters)
     return paint_skin(parameters, canvas(size), canvas(GROUND))
@@ -53,15 +54,10 @@ def paint_skin(
     traits: tuple[np.ndarray, np.ndarray] | None = None,
     hair: bool = True,
 ) -> Skin:
-    """`make_skin` on any canvas.
+    """Make a skin on any canvas.
 
-    Parameters
-    ----------
-    parameters : of the subject
-    on : what is painted on
-    ground : of the same head, GROUND texels wide, where marks are strewn
-    traits : added to the logarithms of melanin and of blood, [N] each
-    hair : whether brows, lashes, beard and scalp are painted
+    Marks are strewn on `ground`, of the same head, GROUND texels wide; traits ([N], [N]) are added to the logarithms of
+    melanin and of blood; hair: paint brows, lashes, beard and scalp.
     """
     area = regions(on)
     melanin, blood = _pigments(parameters, on, area)
@@ -96,7 +92,7 @@ def paint_skin(
 
 
 def _pigments(p: SkinParameters, on: Canvas, area: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Melanin and blood fractions [N] from tone, regions and variation at all scales, without marks."""
+    """Return melanin and blood fractions [N] from tone, regions and variation at all scales, without marks."""
     rng = np.random.default_rng([p.tone_seed, 1])
     flush = p.redness
     blood = (
@@ -140,16 +136,14 @@ def _pigments(p: SkinParameters, on: Canvas, area: dict[str, np.ndarray]) -> tup
 
 
 def _contrast(p: SkinParameters) -> float:
-    """The darker the skin, the more one percent of melanin darkens it: a factor on its relative variation that keeps
-    the visible one alike."""
+    """Return the factor on melanin's relative variation that keeps the visible one alike on all tones."""
     return (0.05 / (p.melanin + 0.02)) ** 0.4
 
 
 def _relief(
     p: SkinParameters, on: Canvas, ground: Canvas, area: dict[str, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Height [N] in mm, how deep in a pore or crease each texel lies [N] in [0, 1.5], and how rough it is [N] of
-    deviation 1."""
+    """Return height [N] in mm, depth [N] in [0, 1.5] in a pore or crease, and roughness [N] of deviation 1."""
     rng = np.random.default_rng([p.pore_seed, 2])
     here, age = regions(ground), np.clip((p.age - 20) / 50, 0, 1)
     density = (
@@ -182,7 +176,7 @@ def _relief(
 
 
 def _lip_lines(on: Canvas, lips: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The lips' vertical creases [N] in [0, 1]: ridged noise drawn out along the way in and out of the mouth."""
+    """Return the lips' vertical creases [N] in [0, 1]: ridged noise stretched along the way in and out of the mouth."""
     lines, there = np.zeros_like(lips), lips > 0.01
     squeezed = on.position[there] * np.float32([1.0, 0.28, 0.28])
     ridge = 1 - np.minimum(1, 1.4 * np.abs(octaves(squeezed, [1.5, 2.6], rng)))
@@ -191,7 +185,7 @@ def _lip_lines(on: Canvas, lips: np.ndarray, rng: np.random.Generator) -> np.nda
 
 
 def _marks(p: SkinParameters, on: Canvas, ground: Canvas) -> tuple[np.ndarray, np.ndarray]:
-    """Freckles and moles: what they add to the logarithm of melanin, and to the height in mm, [N] each."""
+    """Return the effect [N] of freckles and moles on the logarithm of melanin, and on height in mm."""
     rng, here = np.random.default_rng([p.mole_seed, 3]), regions(ground)
     room = here["bald"] * (1 - here["ears"])
     sunny = np.clip(here["cheeks"] + here["nose"] + 0.35 * here["forehead"] + 0.05, 0, 1)
@@ -215,7 +209,7 @@ def _marks(p: SkinParameters, on: Canvas, ground: Canvas) -> tuple[np.ndarray, n
 def _hair(
     p: SkinParameters, on: Canvas, ground: Canvas, area: dict[str, np.ndarray], diffuse: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Cover of all hair [N], and the diffuse albedo with it."""
+    """Return the cover [N] of all hair, and the diffuse albedo with it."""
     rng, here = np.random.default_rng([p.hair_seed, 4]), regions(ground)
     colour, brow_colour = np.asarray(p.hair_colour, np.float32), np.asarray(p.brow_colour, np.float32)
     eyebrow = hairs.grow_brows(on, ground, here["brows"], p.brow_density, rng)

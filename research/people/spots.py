@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Round things on the skin: pores, freckles, moles. Strewn over the surface by a density per mm^2, then splatted to the
-texels near them."""
+"""Pores, freckles and moles, strewn by a density per mm^2 and splatted to the texels near them."""
 
 from __future__ import annotations
 
@@ -13,10 +12,9 @@ from .canvas import Canvas
 
 
 def strew(ground: Canvas, density: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Random points of the surface, float32 [M, 3] in mm, and the ground's texel under each, int [M].
+    """Draw random surface points, float32 [M, 3] in mm, and the ground's texel under each, int [M].
 
-    `density` [N] in points per mm^2, on `ground`: one canvas for all sizes, so that a subject's marks stay where they
-    are at any size.
+    `density` [N] is in points per mm^2 on `ground`: one canvas for all sizes, so that marks stay in place at any size.
     """
     expected = np.cumsum(np.asarray(density, np.float64) * ground.area)
     texel = np.searchsorted(expected, rng.uniform(0, expected[-1], rng.poisson(expected[-1])), side="right")
@@ -34,20 +32,10 @@ def strew(ground: Canvas, density: np.ndarray, rng: np.random.Generator) -> tupl
 def splat_spots(
     on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray, blend=np.maximum
 ) -> np.ndarray:
-    """Bell-shaped spots. A radius below the texel's size becomes the texel's size, with the strength lowered by the
-    same share of area.
+    """Draw bell-shaped spots, float32 [N]; the strongest counts where they overlap.
 
-    Parameters
-    ----------
-    on : what they lie on
-    points : [M, 3], in mm
-    radius : [M], in mm; they end at twice that
-    strength : [M], in the middle
-    blend : ufunc, where they overlap
-
-    Returns
-    -------
-    float32 [N].
+    points [M, 3] and radius [M] in mm, spots end at twice that; strength [M] in the middle. A radius below the texel's
+    size becomes that size, and the strength is lowered by the same share of area.
     """
     out = np.zeros(len(on.position), np.float32)
     if len(points):
@@ -67,20 +55,9 @@ def splat_patches(
     rng: np.random.Generator,
     ragged: float = 0.25,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Flat spots with a ragged edge (a mole's stain), and their dome.
+    """Draw flat spots with a ragged edge (a mole's stain), and their domes: float32 [N] each.
 
-    Parameters
-    ----------
-    on : what they lie on
-    points : [M, 3], in mm
-    radius : [M], in mm
-    strength : [M], from 0
-    rng : of the edge and the grain
-    ragged : twice the deviation of the edge, in radii
-
-    Returns
-    -------
-    Stain and dome, float32 [N] each: the strength in the middle, that of the stain within its grain.
+    points [M, 3] and radius [M] in mm; strength [M] in the middle, for the stain within its grain.
     """
     stain, dome = np.zeros(len(on.position), np.float32), np.zeros(len(on.position), np.float32)
     if len(points):

@@ -10,6 +10,7 @@ from core.geometry.meshes import Mesh
 from core.geometry.raster import RayCaster
 from core.imaging import images
 from research.people import environments, olat, portrait, sight
+from research.people.fitted_light import LampOnHead
 from research.people.identities import subject_mesh
 from research.people.skin import make_skin
 
@@ -81,29 +82,29 @@ def test_the_sun_of_a_panorama_is_taken_out_with_all_its_light():
     )
 
 
-def test_a_picture_is_its_albedo_times_its_shading(seen):
+def test_a_picture_is_its_albedo_times_the_shading_of_even_skin(seen):
     stage, view = seen
     made = portrait.relight_sight(view, stage, np.random.default_rng(3))
     again = portrait.relight_sight(view, stage, np.random.default_rng(3))
     assert np.array_equal(made.srgb, again.srgb)
     on_head = made.head > 0.5
-    clean = images.linear_to_srgb(made.albedo * made.shading)
+    clean = images.linear_to_srgb(made.albedo * made.even)
     assert np.abs(clean - made.srgb)[on_head].mean() < 0.05  # noise, blur and compression lie between
-    assert made.face[~on_head].max() == 0
+    assert made.skin[~on_head].max() == 0
 
 
 def test_two_lights_show_one_albedo(seen):
     stage, view = seen
     one, other = (portrait.relight_sight(view, stage, np.random.default_rng(seed)) for seed in (6, 7))
-    assert np.array_equal(one.albedo, other.albedo) and not np.allclose(one.shading, other.shading, atol=0.1)
+    assert np.array_equal(one.albedo, other.albedo) and not np.allclose(one.even, other.even, atol=0.1)
 
 
 def test_what_turns_away_from_the_only_lamp_is_in_its_shadow(seen):
     _, view = seen
     lamp = np.array([1.0, 0, 0])
-    lost, strong = portrait._shadow(
-        view, [lamp], [np.full(3, 4.0)], [np.ones(len(view.pixel), np.float32)], np.ones((len(view.pixel), 3))
-    )
+    whole = np.ones(len(view.pixel), np.float32)
+    shining = LampOnHead(lamp, np.full(3, 4.0), whole)
+    lost, strong = portrait._shadow(view, [shining], [whole], np.ones((len(view.pixel), 3)))
     assert strong == pytest.approx(0.8)
     assert lost[view.smooth @ lamp < -0.1] == pytest.approx(1) and lost[view.smooth @ lamp > 0.1] == pytest.approx(0)
 

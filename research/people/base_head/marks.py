@@ -1,77 +1,38 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where MediaPipe's 468 landmarks lie on the head: found in shaded pictures of many identities and views, cast onto the
-surface."""
+"""MediaPipe's 468 landmarks on the head: detected in shaded pictures of many identities and views, cast back."""
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import trimesh
+from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from core.face import faces
 from core.geometry.meshes import Mesh, vertex_normals
 from core.geometry.raster import RayCaster
 from core.imaging import images
 
+# fmt: off
 OVAL = (
-    10,
-    338,
-    297,
-    332,
-    284,
-    251,
-    389,
-    356,
-    454,
-    323,
-    361,
-    288,
-    397,
-    365,
-    379,
-    378,
-    400,
-    377,
-    152,
-    148,
-    176,
-    149,
-    150,
-    136,
-    172,
-    58,
-    132,
-    93,
-    234,
-    127,
-    162,
-    21,
-    54,
-    103,
-    67,
-    109,
+    10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377, 152, 148, 176, 149, 150,
+    136, 172, 58, 132, 93, 234, 127, 162, 21, 54, 103, 67, 109,
 )
+# fmt: on
 YAWS_DEG = (-35, -18, 0, 18, 35)  # turns of the head at which the net is asked
 
 
 def find_landmarks(
     mean: np.ndarray, components: np.ndarray, triangles: np.ndarray, identities: int = 6
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where each landmark lies on the mean head, left and right made alike.
+    """Return triangle [468], barycentric [468, 3] and weight [468] in [0, 1] of each landmark on the mean head.
 
-    The first round sees plain heads, the second ones with brows and lips painted where the first found them.
-
-    Parameters
-    ----------
-    mean : [V, 3], in metres
-    components : [K, V, 3], in metres, the shapes of identities at one deviation
-    triangles : [F, 3]
-    identities : how many heads beside the mean are drawn and looked at
-
-    Returns
-    -------
-    Triangle [468], barycentric [468, 3] and weight [468] in [0, 1].
+    Left and right are made alike. The first round looks at plain heads, the second at ones with brows and lips painted
+    where the first found them. mean [V, 3] and components [K, V, 3], at one deviation, in metres; identities: number of
+    heads beside the mean.
     """
     rng = np.random.default_rng(1)
     shapes = [mean] + [
@@ -95,7 +56,7 @@ def find_landmarks(
 
 
 def _onto_surface(points, vertices, triangles):
-    """The closest of the triangles around each point's six nearest vertices, and barycentric coordinates in it."""
+    """Return the closest of the triangles around each point's six nearest vertices, and the place in it."""
     _, near = cKDTree(vertices).query(points, 6)
     chosen, bary = np.zeros(len(points), int), np.zeros((len(points), 3))
     for k, point in enumerate(points):
@@ -109,8 +70,7 @@ def _onto_surface(points, vertices, triangles):
 
 
 def _observe(shape, triangles, colours, mean):
-    """Landmarks of one head from every yaw, as positions on the mean head [views, 468, 3]; nan where the surface was
-    missed or hidden."""
+    """Return landmarks from every yaw as positions on the mean head [views, 468, 3]; nan where missed or hidden."""
     mesh = Mesh(shape, triangles)
     caster, normals = RayCaster(mesh), vertex_normals(mesh)
     views = []
@@ -129,8 +89,7 @@ def _observe(shape, triangles, colours, mean):
 
 
 def _camera(yaw: float, size: int = 512, distance: float = 0.7, width: float = 0.34):
-    """Centre of projection and the function from pixels [N, 2] to unit directions, for a camera that looks at the head
-    from `yaw` degrees."""
+    """Return centre and function from pixels [N, 2] to unit directions of a camera at `yaw` degrees."""
     angle = np.radians(yaw)
     towards = np.array([np.sin(angle), -np.cos(angle), 0.05])
     towards /= np.linalg.norm(towards)
@@ -147,7 +106,7 @@ def _camera(yaw: float, size: int = 512, distance: float = 0.7, width: float = 0
 
 
 def _shaded(caster, normals, colours, origin, direction_of, size: int = 512):
-    """A Lambert picture, sRGB [size, size, 3]."""
+    """Render a Lambert picture, sRGB [size, size, 3]."""
     x, y = np.meshgrid(np.arange(size) + 0.5, np.arange(size) + 0.5)
     directions = direction_of(np.stack([x.ravel(), y.ravel()], -1))
     triangle, bary, _ = caster.first_hits(np.repeat(origin[None], len(directions), 0), directions)
@@ -161,19 +120,14 @@ def _shaded(caster, normals, colours, origin, direction_of, size: int = 512):
 
 
 def _partners(points):
-    """For each landmark the one that is its mirror image."""
-    from scipy.optimize import linear_sum_assignment
-    from scipy.spatial.distance import cdist
-
+    """Return the mirror image of each landmark."""
     cost = cdist(points * [-1, 1, 1], points)
     forward = linear_sum_assignment(cost + cost.T)[1]
     return np.where(forward[forward] == np.arange(len(points)), forward, np.argmin(cost, 1))
 
 
 def _painted(vertices, points):
-    """Vertex colours (linear) with brows and lips inside the landmarks' outlines, seen from the front."""
-    import cv2
-
+    """Return linear vertex colours with brows and lips inside the landmarks' outlines, seen from the front."""
     colours = np.tile([0.55, 0.36, 0.28], (len(vertices), 1))
     for outline, colour in [(faces.LIP_LINE, (0.42, 0.14, 0.13)), *((b, (0.08, 0.05, 0.04)) for b in faces.BROW_LINES)]:
         polygon = points[list(outline)][:, [0, 2]].astype(np.float32)

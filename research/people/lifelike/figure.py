@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A whole person, put together: open or closed head, eyes, hair, clothes, and the maps of the skin with and without
-what grows on it."""
+"""A whole person: head, eyes, hair, clothes, and the skin's maps with and without what grows on it."""
 
 from __future__ import annotations
 
@@ -32,9 +31,12 @@ UNDER = {"hair": 0.8, "beard": 0.35, "brows": 0.15}
 
 @dataclass(frozen=True)
 class Figure:
-    """head: the closed head in the template's topology; opened: the same with its lids as they are; skin: the bare
-    skin's maps; seen float32 [S, S, 3]: its linear albedo between the roots of hair; eye [E, E, 3]: the eyes' albedo;
-    growth: UV map of each growth in [0, 1], [S, S] by part; strands: all hairs."""
+    """A person ready to be filmed.
+
+    head: closed, in the template's topology; opened: with its lids as they are; skin: the bare skin's maps; seen
+    float32 [S, S, 3]: its linear albedo between the roots of hair; eye [E, E, 3]: the eyes' albedo; growth: UV map of
+    each growth in [0, 1], [S, S] by part; strands: all hairs.
+    """
 
     person: Person
     head: Mesh
@@ -48,8 +50,7 @@ class Figure:
 
 
 def make_figure(person: Person | int, size: int = 2048, facekit: Path | None = None) -> Figure:
-    """A person, or the one that a seed stands for, with maps of `size` texels. The same arguments give the same
-    bytes."""
+    """Make a person, or the one of a seed, with maps of `size` texels; the same arguments give the same bytes."""
     if not isinstance(person, Person):
         person = sample_person(person)
     head = person_mesh(person.seed, facekit)
@@ -70,7 +71,7 @@ def make_figure(person: Person | int, size: int = 2048, facekit: Path | None = N
 
 
 def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.ndarray]]:
-    """The bare skin's maps, its albedo between the roots [S, S, 3], and where hair grows [S, S] by part."""
+    """Return the bare skin's maps, its albedo between the roots [S, S, 3], and hair's density [S, S] by part."""
     on = canvas(size)
     skin = paint_skin(person.skin, on, canvas(GROUND), traits.broad_traits(person, on), hair=False)
     diffuse = traits.shaded(person, on, skin.diffuse[on.covered])
@@ -89,15 +90,7 @@ def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.nda
 
 
 def grow_hair(person: Person, head: Mesh, opened: OpenHead, cloth: Mesh) -> tuple[Strands, ...]:
-    """All hairs of a person: brows, lashes, and beard and hair where there are any.
-
-    Parameters
-    ----------
-    person : whose they are
-    head : their closed head, in the template's topology
-    opened : the same with its lids as they are
-    cloth : on which long hair lies
-    """
+    """Grow all hairs of a person; long hair lies on `cloth`."""
     ground, skin = ground_of(head), SkinSurface(head)
     strands = [
         brows.grow_brows(person, ground, skin, _rng(person, 0)),

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from core.face.strands import SkinSurface, Strands, clumped, coloured, grow, waved
+from core.geometry.meshes import unit
 from core.geometry.noise import octaves
 
 from ..canvas import Canvas
@@ -30,7 +31,7 @@ FACE = np.array([0.066, 0.026])
 
 
 def scalp_density(on: Canvas, seed: int) -> np.ndarray:
-    """Where hair grows on a canvas, [N] in [0, 1]: the scalp with an uneven hairline, down to the nape."""
+    """Return head hair's density [N] in [0, 1]: the scalp with an uneven hairline, down to the nape."""
     rng = np.random.default_rng([seed, 66])
     ragged = on.soft(lambda at: octaves(at, [22.0, 10.0], rng, smooth=True))
     soft = np.clip(regions(on)["scalp"] * 2.2 - 0.75 + 0.15 * ragged, 0, 1)
@@ -40,7 +41,7 @@ def scalp_density(on: Canvas, seed: int) -> np.ndarray:
 
 
 def _before_the_ears(on: Canvas) -> np.ndarray:
-    """Where hair of the head comes down between temple and ear, [N] in [0, 1]."""
+    """Return the region [N] in [0, 1] of head hair between temple and ear."""
     x, y, z = on.position.T
     band = np.clip((y - SIDEBURN_MM[0]) / 5, 0, 1) * np.clip((SIDEBURN_MM[1] - y) / 4, 0, 1) * (np.abs(x) > 50)
     above, below = np.clip((z - SIDEBURN_MM[2]) / 8, 0, 1), np.clip((SIDEBURN_MM[3] - z) / 8, 0, 1)
@@ -48,14 +49,9 @@ def _before_the_ears(on: Canvas) -> np.ndarray:
 
 
 def grow_head_hair(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
-    """Cropped, short or long hair; long hair hangs beside the face and lies on the shoulders.
+    """Grow cropped, short or long hair; long hair hangs beside the face and lies on the shoulders.
 
-    Parameters
-    ----------
-    person : whose hair is not "none"
-    ground : of their head
-    skin : which hairs may not enter, clothes included
-    rng : of single hairs
+    The person's hair is not "none"; hairs stay out of `skin`, clothes included.
     """
     on, style = ground.canvas, person.hair
     density = scalp_density(on, person.seed)
@@ -105,8 +101,7 @@ def grow_head_hair(person: Person, ground: Ground, skin: SkinSurface, rng: np.ra
 
 
 def _gathered(points: np.ndarray) -> np.ndarray:
-    """Long hair [M, K, 3] that stands far off below the ears' tops, drawn in: its neighbours hold it. What lies on the
-    shoulders stays."""
+    """Draw in long hair [M, K, 3] that stands far off below the ears' tops; what lies on the shoulders stays."""
     x, y, z = np.moveaxis(points.astype(np.float64), -1, 0)
     across = np.stack([x, y - AXIS[1]], -1)
     reach = np.linalg.norm(across / GATHER[:2], axis=-1)
@@ -118,9 +113,8 @@ def _gathered(points: np.ndarray) -> np.ndarray:
 
 
 def _ways(on: Canvas, person: Person) -> np.ndarray:
-    """The direction in which hair is combed [N, 3]: from the crown outwards, from the parting aside, or forward."""
-    away = on.position - CROWN_MM
-    away = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6)
+    """Return the combing direction [N, 3]: from the crown outwards, from the parting aside, or forward."""
+    away = unit(on.position - CROWN_MM)
     front = _front(on.position)[:, None]
     side = np.tanh((on.position[:, :1] - 1000 * person.parting) / 6) * [1.0, 0, 0]
     if person.hair == "long":
@@ -135,22 +129,22 @@ def _ways(on: Canvas, person: Person) -> np.ndarray:
 
 
 def _front(at: np.ndarray) -> np.ndarray:
-    """How far places [N, 3] mm belong to the hair over the forehead, [N]."""
+    """Return the share [N] to which places [N, 3] in mm belong to the hair over the forehead."""
     return np.clip((50 - at[:, 1]) / 30, 0, 1) * np.clip((at[:, 2] - 45) / 15, 0, 1)
 
 
 def _to_brows(at: np.ndarray) -> np.ndarray:
-    """The length [N] in metres of a fringe that ends above the brows."""
+    """Return the length [N] in metres of a fringe that ends above the brows."""
     return np.clip(1.25 * (at[:, 2] - 26) + 0.8 * np.clip(at[:, 1] + 20, 0, 60), 8, 90) / 1000
 
 
 def _weight(front: np.ndarray, level: float, fringe: float) -> np.ndarray:
-    """How hair that is not stiff bends down, [N, 3]."""
+    """Return the pull [N, 3] that bends hair down if it is not stiff."""
     return np.array([0, 0, -1.0]) * (level + (fringe - level) * front)[:, None]
 
 
 def _beside_the_face(points: np.ndarray) -> np.ndarray:
-    """Long hair [M, K, 3] that would hang before the face, put beside and behind its rim."""
+    """Move long hair [M, K, 3] that would hang before the face beside and behind its rim."""
     x, y, z = np.moveaxis(points, -1, 0)
     below = np.clip((0.055 - z) / 0.03, 0, 1)
     inside = np.clip((FACE[1] - y) / 0.01, 0, 1) * below
