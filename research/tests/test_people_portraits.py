@@ -3,7 +3,7 @@
 """The people that a delighter learns from: their light must know nothing of what grows on them or of what colour they
 are."""
 
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -85,17 +85,6 @@ def test_brows_and_beard_are_lit_as_the_bare_head_is(stage):
         shading = images.srgb_to_linear(made.srgb).mean(-1) / np.maximum(made.albedo.mean(-1), 0.004)
         strands = np.abs(np.diff(np.log(np.maximum(shading, 0.02)), axis=1))[:, :-1][grown[:, 1:-1]]
         assert np.median(slopes) < 0.5 * np.median(strands)  # no strand is seen in it
-
-
-def test_a_lamp_that_is_blocked_everywhere_lights_nothing(stage):
-    dark = replace(stage, unlit=replace(stage.unlit, reach=0 * stage.unlit.reach), reach=0 * stage.reach)
-    colours = portraits.colours_of(stage, np.random.default_rng(2))
-    for seed in range(20):
-        made = portraits.portray(dark, colours, np.random.default_rng(seed))
-        if made.strong > 0.4:
-            assert made.shadow[stage.here].min() > 0.999
-            return
-    pytest.fail("no light was strong in twenty draws")
 
 
 def test_batches_show_each_sight_under_two_lights_and_depend_on_the_seed_alone(tmp_path):

@@ -66,6 +66,6 @@ def grow_lashes(person: Person, head: OpenHead, rng: np.random.Generator) -> Str
 
 
 def _bowed(root: np.ndarray, direction: np.ndarray, length: np.ndarray, bow: np.ndarray) -> np.ndarray:
-    """Return points [M, 6, 3] from roots along directions [M, 3], bent at the tip by `bow` [3], a share of the length."""
+    """Return points [M, 6, 3] from roots along directions [M, 3], bent by `bow` [3] (share of length) at the tip."""
     t = np.linspace(0, 1, 6)[None, :, None]
     return (root[:, None] + length[:, None, None] * (t * direction[:, None] + t**2 * bow)).astype(np.float32)
