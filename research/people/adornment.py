@@ -32,12 +32,9 @@ def paint_scars(on: Canvas, ground: Canvas, expected: float, rng: np.random.Gene
 
     They begin on `ground`, GROUND texels wide, of the same head; `expected` is their mean number.
     """
-    nothing = np.zeros(len(on.position), np.float32)
-    if expected <= 0:
-        return Scars(nothing, nothing, nothing)
     room = regions(ground)["bald"] * (1 - regions(ground)["ears"])
     begins, texel = strew(ground, expected * room / float((ground.area * room).sum()), rng)
-    stain, flush, ridge = nothing.copy(), nothing.copy(), nothing.copy()
+    stain, flush, ridge = np.zeros((3, len(on.position)), np.float32)
     for begin, normal in zip(begins, ground.normal[texel], strict=True):
         way = np.cross(normal, rng.normal(size=3))
         along = np.linspace(0, 1, 60)[:, None]
@@ -53,7 +50,25 @@ def paint_scars(on: Canvas, ground: Canvas, expected: float, rng: np.random.Gene
     return Scars(stain, flush, ridge)
 
 
-def lid_distance(on: Canvas) -> np.ndarray:
+def put_on_make_up(diffuse: np.ndarray, on: Canvas, amount: float, rng: np.random.Generator) -> np.ndarray:
+    """Paint lipstick, eye shadow, liner and blusher, each worn or not, on the linear albedo [N, 3] of a canvas.
+
+    amount in [0, 1]: maximum strength.
+    """
+    if amount <= 0:
+        return diffuse
+    area = regions(on)
+    worn = amount * (rng.random(4) < [0.8, 0.5, 0.5, 0.6]) * rng.uniform(0.4, 1.0, 4)
+    light = diffuse.mean() / 0.25  # the colours are for middling skin
+    lipstick = LIPSTICKS[rng.integers(len(LIPSTICKS))] * light**0.3
+    shadow = SHADOWS[rng.integers(len(SHADOWS))] * light**0.6
+    out = _coat(diffuse, lipstick, 0.9 * worn[0] * np.clip(area["lips"] * 1.3, 0, 1))
+    out = _coat(out, shadow, 0.6 * worn[1] * np.clip(area["eyelids"] + 0.5 * area["sockets"], 0, 1))
+    out = _coat(out, np.array([0.015, 0.012, 0.012]), 0.9 * worn[2] * _lid_line(on))
+    return out * (1 - worn[3] * area["cheeks"][:, None] * np.array([0.05, 0.28, 0.22])).astype(np.float32)
+
+
+def _lid_line(on: Canvas) -> np.ndarray:
     """Return closeness [N] in [0, 1] to the line where the lids meet: 1 on it, 0 from about 2 mm on."""
     if "lid line" not in on.cache:
         lids = lid_lines(on)
@@ -61,30 +76,8 @@ def lid_distance(on: Canvas) -> np.ndarray:
     return on.cache["lid line"]
 
 
-def put_on_make_up(
-    diffuse: np.ndarray, area: dict[str, np.ndarray], lids: np.ndarray, amount: float, rng: np.random.Generator
-) -> np.ndarray:
-    """Paint lipstick, eye shadow, liner and blusher, each worn or not, on the linear albedo [N, 3].
-
-    area: the canvas's `regions`; lids [N]: its `lid_distance`; amount in [0, 1]: maximum strength.
-    """
-    if amount <= 0:
-        return diffuse
-    worn = amount * (rng.random(4) < [0.8, 0.5, 0.5, 0.6]) * rng.uniform(0.4, 1.0, 4)
-    light = diffuse.mean() / 0.25  # the colours are for middling skin
-    lipstick, shadow = (
-        LIPSTICKS[rng.integers(len(LIPSTICKS))] * light**0.3,
-        SHADOWS[rng.integers(len(SHADOWS))] * light**0.6,
-    )
-    out = _coat(diffuse, lipstick, 0.9 * worn[0] * np.clip(area["lips"] * 1.3, 0, 1))
-    out = _coat(out, shadow, 0.6 * worn[1] * np.clip(area["eyelids"] + 0.5 * area["sockets"], 0, 1))
-    out = _coat(out, np.array([0.015, 0.012, 0.012]), 0.9 * worn[2] * lids)
-    return out * (1 - worn[3] * area["cheeks"][:, None] * np.array([0.05, 0.28, 0.22])).astype(np.float32)
-
-
 def _coat(below: np.ndarray, colour: np.ndarray, cover: np.ndarray) -> np.ndarray:
     """Cover `below` [N, 3] with a thin coat of `colour` [3], through which pores and creases show."""
-    relief = np.clip(
-        below.mean(-1, keepdims=True) / max(float(np.average(below.mean(-1), weights=cover + 1e-6)), 1e-4), 0.5, 1.5
-    )
+    middle = max(float(np.average(below.mean(-1), weights=cover + 1e-6)), 1e-4)
+    relief = np.clip(below.mean(-1, keepdims=True) / middle, 0.5, 1.5)
     return (below * (1 - cover[:, None]) + colour * relief * cover[:, None]).astype(np.float32)

@@ -70,9 +70,8 @@ def panorama_environment(panorama: np.ndarray, rng: np.random.Generator) -> Envi
     if rng.random() < 0.5:
         turned = turned[:, ::-1]
     turned, lamp, colour = without_lamp(turned)
-    return _normalised(
-        _gathered(turned), lamp, colour, cv2.resize(turned, (WIDTH, WIDTH // 2), interpolation=cv2.INTER_AREA)
-    )
+    small = cv2.resize(turned, (WIDTH, WIDTH // 2), interpolation=cv2.INTER_AREA)
+    return _normalised(_gathered(turned), lamp, colour, small)
 
 
 def without_lamp(panorama: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -86,9 +85,8 @@ def without_lamp(panorama: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
     hard = luminance > SUN_OVER_MEAN * mean
     if not hard.any():
         return panorama, np.array([0.0, -0.6, 0.8]), np.zeros(3)
-    excess = np.where(
-        hard[..., None], panorama - SUN_OVER_MEAN * mean * panorama / np.maximum(luminance, 1e-6)[..., None], 0
-    )
+    kept = SUN_OVER_MEAN * mean * panorama / np.maximum(luminance, 1e-6)[..., None]
+    excess = np.where(hard[..., None], panorama - kept, 0)
     lamp = (directions * (excess.mean(-1) * solid)[..., None]).sum((0, 1))
     return panorama - excess, lamp / np.linalg.norm(lamp), (excess * solid[..., None]).sum((0, 1)) / np.pi
 
@@ -115,23 +113,15 @@ def background_radiance(environment: Environment, directions: np.ndarray) -> np.
     height, width = environment.panorama.shape[:2]
     column = (0.5 + np.arctan2(directions[..., 0], -directions[..., 1]) / (2 * np.pi)) * width
     row = np.arccos(np.clip(directions[..., 2], -1, 1)) / np.pi * height
-    return cv2.remap(
-        environment.panorama.astype(np.float32),
-        (column - 0.5).astype(np.float32),
-        (row - 0.5).astype(np.float32),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
+    column, row = (column - 0.5).astype(np.float32), (row - 0.5).astype(np.float32)
+    panorama = environment.panorama.astype(np.float32)
+    return cv2.remap(panorama, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
 def _normalised(radiance: np.ndarray, lamp: np.ndarray, colour: np.ndarray, panorama: np.ndarray) -> Environment:
     mean = max(float(radiance.mean()), 1e-6)
-    return Environment(
-        (radiance / mean).astype(np.float32),
-        lamp,
-        (colour / mean).astype(np.float32),
-        (panorama / mean).astype(np.float32),
-    )
+    radiance, colour, panorama = ((light / mean).astype(np.float32) for light in (radiance, colour, panorama))
+    return Environment(radiance, lamp, colour, panorama)
 
 
 def _gathered(panorama: np.ndarray) -> np.ndarray:
@@ -142,10 +132,8 @@ def _gathered(panorama: np.ndarray) -> np.ndarray:
         panorama = cv2.resize(panorama, (width, height), interpolation=cv2.INTER_AREA)
     solid = solid_angles(height, width).ravel()
     weight = np.bincount(_NEAREST, solid, len(DIRECTIONS))
-    return (
-        np.stack([np.bincount(_NEAREST, solid * panorama[..., k].ravel(), len(DIRECTIONS)) for k in range(3)], -1)
-        / weight[:, None]
-    )
+    sums = [np.bincount(_NEAREST, solid * panorama[..., k].ravel(), len(DIRECTIONS)) for k in range(3)]
+    return np.stack(sums, -1) / weight[:, None]
 
 
 def panorama_directions(height: int, width: int) -> np.ndarray:

@@ -100,7 +100,7 @@ def _strokes(
     share = np.clip(1 - distance / (1.5 * radius), 0, 1) * taper * min(1.0, 2 * width / radius)
     order = np.lexsort((-share, texel, hair[point]))
     key = hair[point][order].astype(np.int64) * len(cover) + texel[order]
-    first = np.concatenate([[True], key[1:] != key[:-1]]) if len(key) else np.zeros(0, bool)
+    strongest = order[np.diff(key, prepend=-1) != 0]
     left = np.zeros(len(cover), np.float64)
-    np.add.at(left, texel[order][first], np.log1p(-np.minimum(share[order][first], 0.95)))
+    np.add.at(left, texel[strongest], np.log1p(-np.minimum(share[strongest], 0.95)))
     return (1 - np.exp(left)).astype(np.float32)

@@ -5,6 +5,7 @@
 World: metres, +Z up, the face towards -Y. Azimuth 0 is in front, positive on the person's left.
 """
 
+from dataclasses import replace
 from functools import cache
 
 import cv2
@@ -75,17 +76,16 @@ def photograph(
     caster, normals, albedo = person(seed, texels)
     turn = np.radians(turned_deg)
     rotation = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
-    # the camera as the head sees it
-    seen = View(view.name, view.path, view.camera, view.rotation @ rotation, view.translation, True)
-    face, bary, _ = raster.render_view(caster, seen, 2)
+    # the camera in the head's axes
+    face, bary, _ = raster.render_view(caster, replace(view, rotation=view.rotation @ rotation), 2)
     hit = face >= 0  # what lies beside the head need not be worked out
     face, bary = face[hit], bary[hit]
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
     colour = raster.sample_uv(albedo, uv)
     normal = raster.interpolate(normals, caster.mesh.faces, face, bary) @ rotation.T
-    shade = (
-        np.full(len(face), 0.9) if even else 0.55 + 0.45 * np.clip(normal @ (np.array([0.3, -0.8, 0.5]) / 0.99), 0, 1)
-    )
+    shade = np.full(len(face), 0.9)
+    if not even:
+        shade = 0.55 + 0.45 * np.clip(normal @ (np.array([0.3, -0.8, 0.5]) / 0.99), 0, 1)
     lit = np.zeros((*hit.shape, 3), np.float32)
     lit[hit] = colour * (shade * 1.6)[:, None]
     head = images.resize(lit, view.width, view.height)
@@ -108,10 +108,5 @@ def _wall(view: View) -> np.ndarray:
         reach = (WALL_AT - view.centre[1]) / rays[:, 1]
     hit = view.centre + rays * np.where(reach > 0, reach, 0)[:, None]
     at = ((hit[:, [0, 2]] / WALL_M + 0.5) % 1 * 1200).astype(np.float32)
-    return cv2.remap(
-        _paper(),
-        at[:, :1].reshape(y.shape),
-        at[:, 1:].reshape(y.shape),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REFLECT,
-    )
+    column, row = (at[:, k].reshape(y.shape) for k in range(2))
+    return cv2.remap(_paper(), column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)

@@ -16,6 +16,8 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
+from core.geometry import raster
+
 # volume fraction of melanosomes in the epidermis; Jacques: 0.013 ... 0.43 from very light to very dark skin
 MELANIN_RANGE = 0.002, 0.9
 BLOOD_RANGE = 0.001, 0.3  # volume fraction of blood in the dermis; normal skin 0.002 ... 0.07, lips and flush more
@@ -64,17 +66,9 @@ def reflectance(
     luminance, as cameras show skin more saturated than a spectrometer does.
     """
     melanin, blood = np.asarray(melanin, np.float32), np.asarray(blood, np.float32)
-    x = _position(blood, BLOOD_RANGE).reshape(1, -1)
-    y = _position(melanin, MELANIN_RANGE).reshape(1, -1)
-    table = _table(
-        round(float(oxygen), 3), round(float(scattering), 3), round(float(slope), 3), round(float(chroma), 3)
-    )
-    step = 32000  # cv2.remap takes fewer than 32767 columns
-    parts = [
-        cv2.remap(table, x[:, i : i + step], y[:, i : i + step], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        for i in range(0, x.size, step)
-    ]
-    return np.concatenate(parts, 1).reshape(*melanin.shape, 3)
+    table = _table(*(round(float(parameter), 3) for parameter in (oxygen, scattering, slope, chroma)))
+    at = np.stack([_position(blood, BLOOD_RANGE).ravel(), _position(melanin, MELANIN_RANGE).ravel()], 1)
+    return raster.sample(table, at + np.float32(0.5)).reshape(*melanin.shape, 3)
 
 
 def typology_angle(linear: np.ndarray) -> np.ndarray:

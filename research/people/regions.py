@@ -71,28 +71,13 @@ def creases(on: Canvas, rng: np.random.Generator) -> list[tuple[np.ndarray, floa
     lines: list[tuple[np.ndarray, float, float, float]] = []
 
     def add(points: np.ndarray, width: float, depth: float, begins: float) -> None:
-        wobble = rng.normal(0, 1.2, points.shape) * [1, 0, 1]
-        lines.append(
-            (
-                _curve(points + wobble),
-                width * rng.uniform(0.8, 1.3),
-                depth * rng.uniform(0.6, 1.4),
-                begins + rng.normal(0, 6),
-            )
-        )
+        curve = _curve(points + rng.normal(0, 1.2, points.shape) * [1, 0, 1])
+        width, depth = width * rng.uniform(0.8, 1.3), depth * rng.uniform(0.6, 1.4)
+        lines.append((curve, width, depth, begins + rng.normal(0, 6)))
 
+    low, high = at[[70, 105, 107, 9, 336, 334, 300]], at[[54, 103, 109, 10, 338, 332, 284]]
     for share in (0.25, 0.45, 0.65, 0.85):  # across the forehead
-        add(
-            np.stack(
-                [
-                    at[low] + share * (at[high] - at[low])
-                    for low, high in ((70, 54), (105, 103), (107, 109), (9, 10), (336, 338), (334, 332), (300, 284))
-                ]
-            ),
-            1.6,
-            0.25,
-            34,
-        )
+        add(low + share * (high - low), 1.6, 0.25, 34)
     for side in ((129, 203, 206, 216, 212), (358, 423, 426, 436, 432)):  # beside the nose and mouth
         add(at[list(side)], 2.4, 0.35, 30)
     for side in ((61, 202, 204), (291, 422, 424)):  # below the corners of the mouth
@@ -123,10 +108,7 @@ def _blobs(points: np.ndarray, landmarks: np.ndarray, blobs: list[tuple[int, flo
 
 
 def _around(points: np.ndarray, centres: np.ndarray, radius: float) -> np.ndarray:
-    weight = np.zeros(len(points), np.float32)
-    for centre in centres:
-        np.maximum(weight, _gaussian(points, centre, radius), out=weight)
-    return weight
+    return np.max([_gaussian(points, centre, radius) for centre in centres], axis=0)
 
 
 def _gaussian(points: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:

@@ -23,11 +23,9 @@ def expose(radiance: np.ndarray, metered_on: np.ndarray, rng: np.random.Generato
     cast = radiance[metered_on].mean(0) / radiance[metered_on].mean() / [1.35, 0.92, 0.73]  # against usual skin
     cast = rng.uniform(0, 0.8) * np.log(np.clip(cast, 0.2, 5))
     gains = exposure * np.exp(-cast + rng.normal(0, [0.10, 0.04, 0.14]))
-    gains = (
-        np.minimum(gains, 1.6 / max(float(np.quantile((radiance[metered_on] * gains).max(-1), 0.9)), 1e-6) * gains)
-        if rng.random() < 0.9
-        else gains
-    )
+    if rng.random() < 0.9:
+        bright = max(float(np.quantile((radiance[metered_on] * gains).max(-1), 0.9)), 1e-6)
+        gains = np.minimum(gains, 1.6 / bright * gains)
     return np.clip(radiance * gains, 0, 1).astype(np.float32), gains
 
 
@@ -54,7 +52,6 @@ def develop(srgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         srgb = srgb + level * np.sqrt(np.clip(srgb, 0.02, 1)) * noise
     pixels = np.round(255 * np.clip(srgb, 0, 1)).astype(np.uint8)
     if rng.random() < 0.7:
-        pixels = cv2.imdecode(
-            cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(45, 97))])[1], cv2.IMREAD_COLOR
-        )
+        _, stored = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(45, 97))])
+        pixels = cv2.imdecode(stored, cv2.IMREAD_COLOR)
     return pixels.astype(np.float32) / 255

@@ -19,7 +19,7 @@ from .canvas import Canvas, canvas
 from .parameters import SkinParameters, sample_parameters
 from .regions import creases, lid_lines, regions
 from .relief import normals
-from .spots import splat_patches, splat_spots, strew
+from .spots import splat_moles, splat_spots, strew
 
 GROUND = 512  # size of the canvas on which marks are strewn, whatever the size of the maps
 
@@ -42,9 +42,8 @@ class Skin:
 
 def make_skin(parameters: SkinParameters | int, size: int = 1024) -> Skin:
     """Make the skin of parameters or of a seed; the same parameters and size give the same bytes."""
-    if not isinstance(parameters, SkinParameters):
-        parameters = sample_parameters(parameters)
-    return paint_skin(parameters, canvas(size), canvas(GROUND))
+    known = parameters if isinstance(parameters, SkinParameters) else sample_parameters(parameters)
+    return paint_skin(known, canvas(size), canvas(GROUND))
 
 
 def paint_skin(
@@ -59,28 +58,23 @@ def paint_skin(
     Marks are strewn on `ground`, of the same head, GROUND texels wide; traits ([N], [N]) are added to the logarithms of
     melanin and of blood; hair: paint brows, lashes, beard and scalp.
     """
-    area = regions(on)
-    melanin, blood = _pigments(parameters, on, area)
+    p, area = parameters, regions(on)
+    melanin, blood = _pigments(p, on, area)
     if traits is not None:
         melanin, blood = melanin * np.exp(traits[0]), blood * np.exp(traits[1])
-    height, hollow, dry = _relief(parameters, on, ground, area)
-    blood = blood * np.exp(0.12 * hollow)
-    melanin = melanin * np.exp(0.20 * _contrast(parameters) * hollow)
-    stain, dome = _marks(parameters, on, ground)
-    melanin = melanin * np.exp(stain)
-    height = height + dome
-    p = parameters
+    height, hollow, dry = _relief(p, on, ground, area)
+    melanin, blood = melanin * np.exp(0.20 * _contrast(p) * hollow), blood * np.exp(0.12 * hollow)
+    stain, dome = _marks(p, on, ground)
+    melanin, height = melanin * np.exp(stain), height + dome
     scar = adornment.paint_scars(on, ground, p.scars, np.random.default_rng([p.adorn_seed, 10]))
     melanin, blood, height = melanin * np.exp(scar.stain), blood * np.exp(scar.flush), height + scar.ridge
 
     diffuse = pigment.reflectance(melanin, blood, p.oxygen, p.scattering, p.slope, p.chroma)
     diffuse = diffuse * (1 - 0.07 * np.clip(hollow, 0, 1))[:, None]
-    diffuse = adornment.put_on_make_up(
-        diffuse, area, adornment.lid_distance(on), p.make_up, np.random.default_rng([p.adorn_seed, 11])
-    )
-    specular = _specular(parameters, on, area, hollow, dry)
+    diffuse = adornment.put_on_make_up(diffuse, on, p.make_up, np.random.default_rng([p.adorn_seed, 11]))
+    specular = _specular(p, on, area, hollow, dry)
     if hair:
-        cover, diffuse = _hair(parameters, on, ground, area, diffuse)
+        cover, diffuse = _hair(p, on, ground, area, diffuse)
         specular, height = specular * (1 - 0.55 * cover), height + 0.05 * cover
     return Skin(
         on.spread(np.clip(diffuse, 0, 1)),
@@ -94,9 +88,8 @@ def paint_skin(
 def _pigments(p: SkinParameters, on: Canvas, area: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Return melanin and blood fractions [N] from tone, regions and variation at all scales, without marks."""
     rng = np.random.default_rng([p.tone_seed, 1])
-    flush = p.redness
     blood = (
-        flush
+        p.redness
         * (
             0.55 * area["cheeks"]
             + 0.70 * area["nose"]
@@ -190,19 +183,14 @@ def _marks(p: SkinParameters, on: Canvas, ground: Canvas) -> tuple[np.ndarray, n
     room = here["bald"] * (1 - here["ears"])
     sunny = np.clip(here["cheeks"] + here["nose"] + 0.35 * here["forehead"] + 0.05, 0, 1)
     points, _ = strew(ground, 0.22 * p.freckles * sunny * room, rng)
-    freckles = splat_spots(
-        on,
-        points,
-        rng.lognormal(np.log(0.40), 0.35, len(points)),
-        p.freckle_contrast * _contrast(p) * rng.uniform(0.3, 1.0, len(points)),
-    )
+    radius = rng.lognormal(np.log(0.40), 0.35, len(points))
+    freckles = splat_spots(on, points, radius, p.freckle_contrast * _contrast(p) * rng.uniform(0.3, 1.0, len(points)))
     points, _ = strew(ground, p.moles * room / float((ground.area * room).sum()), rng)
     radius = np.clip(rng.lognormal(np.log(0.75), 0.45, len(points)), 0.4, 2.5)
     # a dark stain needs more melanin on light skin; raised ones are often paler
     raised = (rng.random(len(points)) < 0.4) * np.minimum(radius, 1.5) * rng.uniform(0.15, 0.45, len(points))
     strength = rng.uniform(0.45, 1.0, len(points)) * np.log(0.55 / np.minimum(p.melanin, 0.4))
-    stain, _ = splat_patches(on, points, radius, strength, rng)
-    _, dome = splat_patches(on, points, radius, raised, rng)
+    stain, dome = splat_moles(on, points, radius, strength, raised, rng)
     return np.maximum(freckles, stain), dome
 
 

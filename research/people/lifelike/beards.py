@@ -11,7 +11,7 @@ from core.geometry.noise import octaves
 
 from ..canvas import Canvas
 from ..regions import regions
-from .ground import Ground, strew_roots, turned
+from .ground import Ground, strew_roots
 from .person import Person
 
 DENSITY = {"stubble": 0.75, "moustache": 1.3, "full": 0.85}  # hairs per mm^2 where it is densest
@@ -26,8 +26,7 @@ def grow_beard(person: Person, ground: Ground, skin: SkinSurface, rng: np.random
     """
     on, kind = ground.canvas, person.beard
     density = DENSITY[kind] * beard_density(kind, on, np.random.default_rng([person.seed, 65]))
-    roots = strew_roots(ground, density, _ways(on), rng)
-    roots = turned(roots, rng.normal(0, 0.3, len(roots.at)))
+    roots = strew_roots(ground, density, _ways(on), 0.3, rng)
     count = len(roots.at)
     # a moustache is kept out of the mouth
     upper = np.clip((roots.at[:, 2] - on.landmarks[0, 2] + 6) / 8, 0, 1) * (np.abs(roots.at[:, 0]) < 32)

@@ -11,7 +11,7 @@ from core.face.strands import SkinSurface, Strands, coloured, grow
 from core.geometry.meshes import unit
 
 from ..regions import regions
-from .ground import Ground, strew_roots, turned
+from .ground import Ground, strew_roots
 from .person import Person
 
 RADIUS_M = 0.000045  # of a hair at its root
@@ -27,8 +27,7 @@ def grow_brows(person: Person, ground: Ground, skin: SkinSurface, rng: np.random
     way = np.sign(on.position[:, :1]) * [1.0, 0, 0] + rise * [0, 0, 1.0]
     chance = np.clip(region * 2.4 - 1.5 + 0.6 * min(person.brow, 1.3), 0, 1)
     density = (1.25 - 0.6 * outer[:, 0].clip(0, 1)) * 1.15 * person.brow * chance
-    roots = strew_roots(ground, density, way, rng)
-    roots = turned(roots, rng.normal(0, 0.22, len(roots.at)))
+    roots = strew_roots(ground, density, way, 0.22, rng)
     count = len(roots.at)
     tail = np.clip(np.abs(roots.at[:, 0]) / np.abs(on.landmarks[[70, 300], 0]).mean(), 0, 1.2)
     length = rng.uniform(0.0045, 0.0085, count) * (1.05 - 0.25 * tail)

@@ -35,15 +35,15 @@ NEIGHBOURS = 8
 @lru_cache(maxsize=1)
 def fields(folder: Path) -> np.ndarray:
     """Return displacements [K, V, 3] in metres of the template's vertices, one for each identity in the folder."""
-    model = folder / "FaceXModel" if (folder / "FaceXModel").is_dir() else folder
+    model = folder / "FaceXModel"
     neutral = _vertices(model / "generic_neutral_mesh.obj")
-    marks = neutral[_landmarks(model / "vertex_indices.json")]
+    indices = json.loads((model / "vertex_indices.json").read_text(encoding="utf-8"))
+    marks = neutral[indices["idx_to_landmark_verts"]]
     mesh = template.load()
     ours = template.landmark_points(mesh)[list(OURS)]
     scale, turn, shift = _similarity(ours, marks)
-    warp = RBFInterpolator(
-        scale * ours[JAW:] @ turn.T + shift, marks[JAW:] - (scale * ours[JAW:] @ turn.T + shift), smoothing=1e-3
-    )
+    placed = scale * ours[JAW:] @ turn.T + shift
+    warp = RBFInterpolator(placed, marks[JAW:] - placed, smoothing=1e-3)
     placed = scale * mesh.vertices @ turn.T + shift
     # centimetres: away from the landmarks the warp knows nothing
     fade = np.exp(-((cKDTree(marks).query(placed)[0] / 6.0) ** 2))[:, None]
@@ -58,19 +58,8 @@ def fields(folder: Path) -> np.ndarray:
 
 
 def _vertices(path: Path) -> np.ndarray:
-    return np.array(
-        [line.split()[1:4] for line in path.read_text(encoding="ascii").splitlines() if line.startswith("v ")],
-        np.float64,
-    )
-
-
-def _landmarks(path: Path) -> list[int]:
-    """Return the 68 vertex numbers, wherever in the file they stand."""
-    indices = json.loads(path.read_text(encoding="utf-8"))
-    for value in indices.values() if isinstance(indices, dict) else [indices]:
-        if isinstance(value, list) and len(value) == len(OURS):
-            return value
-    raise ValueError(f"{path} lists no {len(OURS)} landmarks")
+    lines = path.read_text(encoding="ascii").splitlines()
+    return np.array([line.split()[1:4] for line in lines if line.startswith("v ")], np.float64)
 
 
 def _similarity(source: np.ndarray, target: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:

@@ -51,23 +51,13 @@ class Figure:
 
 def make_figure(person: Person | int, size: int = 2048, facekit: Path | None = None) -> Figure:
     """Make a person, or the one of a seed, with maps of `size` texels; the same arguments give the same bytes."""
-    if not isinstance(person, Person):
-        person = sample_person(person)
+    person = person if isinstance(person, Person) else sample_person(person)
     head = person_mesh(person.seed, facekit)
     opened = open_lids(head, person.openness if person.openness >= OPENEST else 0.0, np.array(person.gaze))
     skin, seen, growth = paint(person, size)
     cloth = shirt(person, head)
-    return Figure(
-        person,
-        head,
-        opened,
-        cloth,
-        skin,
-        seen,
-        eyes.paint_eyes(np.array(person.iris), opened.balls[0].radius, person.seed),
-        growth,
-        grow_hair(person, head, opened, cloth),
-    )
+    eye = eyes.paint_eyes(np.array(person.iris), opened.balls[0].radius, person.seed)
+    return Figure(person, head, opened, cloth, skin, seen, eye, growth, grow_hair(person, head, opened, cloth))
 
 
 def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.ndarray]]:
@@ -92,16 +82,10 @@ def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.nda
 def grow_hair(person: Person, head: Mesh, opened: OpenHead, cloth: Mesh) -> tuple[Strands, ...]:
     """Grow all hairs of a person; long hair lies on `cloth`."""
     ground, skin = ground_of(head), SkinSurface(head)
-    strands = [
-        brows.grow_brows(person, ground, skin, _rng(person, 0)),
-        brows.grow_lashes(person, opened, _rng(person, 1)),
-    ]
+    rngs = [np.random.default_rng([person.seed, 68, growth]) for growth in range(4)]
+    strands = [brows.grow_brows(person, ground, skin, rngs[0]), brows.grow_lashes(person, opened, rngs[1])]
     if person.beard != "none":
-        strands.append(beards.grow_beard(person, ground, skin, _rng(person, 2)))
+        strands.append(beards.grow_beard(person, ground, skin, rngs[2]))
     if person.hair != "none":
-        strands.append(head_hair.grow_head_hair(person, ground, SkinSurface(joined([head, cloth])), _rng(person, 3)))
+        strands.append(head_hair.grow_head_hair(person, ground, SkinSurface(joined([head, cloth])), rngs[3]))
     return tuple(strands)
-
-
-def _rng(person: Person, growth: int) -> np.random.Generator:
-    return np.random.default_rng([person.seed, 68, growth])

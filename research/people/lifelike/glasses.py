@@ -88,32 +88,18 @@ def sample_glasses(landmarks: np.ndarray, rng: np.random.Generator, kind: str = 
         share = np.linspace(0, 1, 40)[:, None]
         corner = begin + [side * rng.uniform(0.002, 0.006), 0.004, 0.0]
         bars.append(np.concatenate([[begin], corner + share * (end - corner)]))
-    rim = (
-        np.exp(rng.uniform(*np.log([0.0025, 0.007])))
-        if kind in ("thick", "sunglasses")
-        else np.exp(rng.uniform(*np.log([0.0008, 0.0025])))
-    )
-    solid = np.ones(STEPS)
+    thickness = [0.0025, 0.007] if kind in ("thick", "sunglasses") else [0.0008, 0.0025]
+    rim, solid = np.exp(rng.uniform(*np.log(thickness))), np.ones(STEPS)
     if kind == "half":
         solid = np.clip(0.5 + 3 * (up + 0.2), 0.12, 1)
     if kind == "rimless":
         rim, solid = 0.0012, np.full(STEPS, rng.uniform(0.1, 0.35))
     colour = COLOURS[rng.integers(len(COLOURS))] * np.exp(rng.normal(0, 0.25)) * np.exp(rng.normal(0, 0.08, 3))
-    passes = (
-        rng.uniform(0.86, 0.98) * np.exp(rng.normal(0, 0.02, 3))
-        if kind != "sunglasses"
-        else rng.uniform(0.03, 0.35) * np.exp(rng.normal(0, 0.2, 3))
-    )
-    return Glasses(
-        rims,
-        tuple(bars),
-        float(rim),
-        float(max(0.0011, rim * rng.uniform(0.6, 1.1)) if kind != "rimless" else rng.uniform(0.001, 0.002)),
-        solid,
-        np.clip(colour, 0.003, 0.85),
-        float(rng.random()),
-        passes,
-    )
+    low, high, tint = (0.03, 0.35, 0.2) if kind == "sunglasses" else (0.86, 0.98, 0.02)
+    passes = rng.uniform(low, high) * np.exp(rng.normal(0, tint, 3))
+    bar = rng.uniform(0.001, 0.002) if kind == "rimless" else max(0.0011, rim * rng.uniform(0.6, 1.1))
+    colour = np.clip(colour, 0.003, 0.85)
+    return Glasses(rims, tuple(bars), float(rim), float(bar), solid, colour, float(rng.random()), passes)
 
 
 def put_on(
@@ -131,26 +117,22 @@ def put_on(
             continue
         away = np.linalg.norm(curve - view.centre, axis=1)
         at = np.clip(pixels.astype(int), 0, [depth.shape[1] - 1, depth.shape[0] - 1])
-        seen = away < depth[at[:, 1], at[:, 0]] + 0.002
+        before = away < depth[at[:, 1], at[:, 0]] + 0.002
         width = thick * view.camera.mean_focal_length() / distance
-        seen_curve = SeenCurve(pixels, width, seen * solid, closed)
-        where, shade = _drawn(radiance.shape[:2], seen_curve, glasses, light, rng)
+        curve = SeenCurve(pixels, width, before * solid, closed)
+        where, shade = _drawn(radiance.shape[:2], curve, glasses, light, rng)
         frame, colour = frame + where * (1 - frame), colour * (1 - where[..., None]) + shade * where[..., None]
         if closed:
             lens = np.maximum(lens, fill_outline(radiance.shape[:2], pixels))
     colour = colour / np.maximum(frame, 1e-4)[..., None]
-    away = rng.normal(0, 0.012, 2) * len(frame) + [0, 0.01 * len(frame)]
-    shadow = cv2.GaussianBlur(
-        cv2.warpAffine(frame, np.float32([[1, 0, away[0]], [0, 1, away[1]]]), frame.shape[::-1]),
-        (0, 0),
-        rng.uniform(0.6, 3),
-    )
-    picture = radiance * (
-        1 - (rng.random() < 0.6) * rng.uniform(0.1, 0.6) * shadow[..., None] * (1 - lens[..., None] * 0.3)
-    )
-    passes = np.float32(glasses.passes)
-    picture = picture * (1 + lens[..., None] * (passes - 1)) + lens[..., None] * _reflected(frame.shape, light, rng)
-    return picture * (1 - frame[..., None]) + colour * frame[..., None]
+    x, y = rng.normal(0, 0.012, 2) * len(frame) + [0, 0.01 * len(frame)]
+    shadow = cv2.warpAffine(frame, np.float32([[1, 0, x], [0, 1, y]]), frame.shape[::-1])
+    shadow = cv2.GaussianBlur(shadow, (0, 0), rng.uniform(0.6, 3))[..., None]
+    lens, frame = lens[..., None], frame[..., None]
+    picture = radiance * (1 - (rng.random() < 0.6) * rng.uniform(0.1, 0.6) * shadow * (1 - lens * 0.3))
+    reflected = _reflected(frame.shape[:2], light, rng)
+    picture = picture * (1 + lens * (np.float32(glasses.passes) - 1)) + lens * reflected
+    return picture * (1 - frame) + colour * frame
 
 
 def _curves(glasses: Glasses) -> list[tuple]:
@@ -201,13 +183,8 @@ def _drawn(
         cv2.line(shade, points[step].tolist(), points[other].tolist(), value, thick + 2)
         if thick > 3:
             shift = np.round(lean * thick).astype(int)
-            cv2.line(
-                shade,
-                (points[step] + shift).tolist(),
-                (points[other] + shift).tolist(),
-                (np.array(value) * edge).tolist(),
-                thick // 3,
-            )
+            begin, end = (points[step] + shift).tolist(), (points[other] + shift).tolist()
+            cv2.line(shade, begin, end, (np.array(value) * edge).tolist(), thick // 3)
     size = shape[::-1]
     return cv2.resize(where, size, interpolation=cv2.INTER_AREA), cv2.resize(shade, size, interpolation=cv2.INTER_AREA)
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -37,24 +37,19 @@ def ground_of(skin: Mesh) -> Ground:
     return Ground(on, position, unit(normal))
 
 
-def strew_roots(ground: Ground, density: np.ndarray, way: np.ndarray, rng: np.random.Generator) -> Roots:
+def strew_roots(ground: Ground, density: np.ndarray, way: np.ndarray, spread: float, rng: np.random.Generator) -> Roots:
     """Strew roots of hairs at random.
 
     density [N]: hairs per mm^2; way [N, 3]: direction of hairs, in the template's axes, any length, flattened onto the
-    skin.
+    skin and turned about its normal by a deviation of `spread` radians.
     """
     at, texel = strew(ground.canvas, density, rng)
     offset = (at - ground.canvas.position[texel]) / 1000
     normal = ground.normal[texel]
     position = ground.position[texel] + offset - (offset * normal).sum(1, keepdims=True) * normal
-    flat = way[texel] - (way[texel] * normal).sum(1, keepdims=True) * normal
-    return Roots(position, normal, unit(flat), at)
-
-
-def turned(roots: Roots, radians: np.ndarray) -> Roots:
-    """Turn the roots' directions about the skin's normal by `radians` [M]."""
-    c, s = np.cos(radians)[:, None], np.sin(radians)[:, None]
-    return replace(roots, direction=c * roots.direction + s * np.cross(roots.normal, roots.direction))
+    flat = unit(way[texel] - (way[texel] * normal).sum(1, keepdims=True) * normal)
+    turn = rng.normal(0, spread, (len(at), 1))
+    return Roots(position, normal, np.cos(turn) * flat + np.sin(turn) * np.cross(normal, flat), at)
 
 
 @cache

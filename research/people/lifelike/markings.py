@@ -32,19 +32,11 @@ def moles(side: int, rng: np.random.Generator) -> np.ndarray:
     for _ in range(int(rng.integers(2, 40))):
         spot = np.zeros((side, side), np.uint8)
         at, radius = rng.uniform(0.1, 0.9, 2) * side, np.exp(rng.uniform(np.log(0.5), np.log(6.0)))
-        axes = (radius * np.exp(rng.normal(0, 0.2, 2)) * 16).astype(int)
-        cv2.ellipse(
-            spot,
+        axes, middle = (
+            (radius * np.exp(rng.normal(0, 0.2, 2)) * 16).astype(int).tolist(),
             (at * 16).astype(int).tolist(),
-            axes.tolist(),
-            float(rng.uniform(0, 180)),
-            0,
-            360,
-            255,
-            -1,
-            cv2.LINE_AA,
-            4,
         )
+        cv2.ellipse(spot, middle, axes, float(rng.uniform(0, 180)), 0, 360, 255, -1, cv2.LINE_AA, 4)
         tint = rng.normal(-0.5, 0.4) + rng.normal(0, 0.1, 3)
         log += (spot.astype(np.float32) / 255)[..., None] * tint.astype(np.float32)
     return np.clip(log, -1.6, 1.0)

@@ -23,9 +23,7 @@ def sample_sway(frames: int, millimetres: float, degrees: float, rng: np.random.
 
     Smooth motion of mean zero about the neck; deviations per axis in millimetres and degrees.
     """
-    path = gaussian_filter1d(rng.normal(size=(frames + 8 * PERIOD, 6)), PERIOD, axis=0)[
-        4 * PERIOD : 4 * PERIOD + frames
-    ]
+    path = gaussian_filter1d(rng.normal(size=(frames + 8 * PERIOD, 6)), PERIOD, axis=0)[4 * PERIOD : -4 * PERIOD]
     path = (path - path.mean(0)) / np.maximum(path.std(0), 1e-9)
     turn = Rotation.from_rotvec(np.radians(degrees) * path[:, :3]).as_matrix()
     poses = np.tile(np.eye(4), (frames, 1, 1))
@@ -72,11 +70,8 @@ def rolling_shutter(picture: np.ndarray, flow: np.ndarray, readout: float) -> np
 
 def motion_blur(picture: np.ndarray, flow: np.ndarray, shutter: float) -> np.ndarray:
     """Average a picture [H, W, C] along the flow [H, W, 2] over an exposure of `shutter` of a frame's time."""
-    return np.mean(
-        [shifted(picture, flow * t) for t in shutter * (np.arange(TAPS) + 0.5 - TAPS / 2) / TAPS],
-        axis=0,
-        dtype=np.float32,
-    )
+    times = shutter * (np.arange(TAPS) + 0.5 - TAPS / 2) / TAPS
+    return np.mean([shifted(picture, flow * t) for t in times], axis=0, dtype=np.float32)
 
 
 def shifted(picture: np.ndarray, by: np.ndarray) -> np.ndarray:

@@ -78,9 +78,8 @@ def develop(linear: np.ndarray, phone: Phone, gain: np.ndarray, rng: np.random.G
 
 def add_noise(linear: np.ndarray, shot: float, read: float, rng: np.random.Generator) -> np.ndarray:
     """Add a sensor's noise of variance shot x signal + read^2 to a linear signal [...]."""
-    return (
-        linear + rng.standard_normal(linear.shape, np.float32) * np.sqrt(shot * np.maximum(linear, 0) + read**2)
-    ).astype(np.float32)
+    deviation = np.sqrt(shot * np.maximum(linear, 0) + read**2)
+    return (linear + rng.standard_normal(linear.shape, np.float32) * deviation).astype(np.float32)
 
 
 def reduce_noise(linear: np.ndarray, strength: float, shot: float, read: float) -> np.ndarray:

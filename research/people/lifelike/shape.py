@@ -34,9 +34,9 @@ def person_mesh(seed: int, facekit: Path | None = None) -> Mesh:
     """Return a person's closed head in the template's topology and pose: metres, +Z up, face towards -Y."""
     rng = np.random.default_rng([seed, 60])
     basis = np.tensordot(WITHIN * identity_coefficients(seed), template.identity(), 1)
-    outside = _unit(_lessened(_random_field(rng)))
+    outside = _lessened(_random_field(rng))
     if facekit:
-        outside = (1 - FACEKIT) * outside + FACEKIT * _unit(_lessened(_from_facekit(facekit, rng)))
+        outside = (1 - FACEKIT) * outside + FACEKIT * _lessened(_from_facekit(facekit, rng))
     outside *= rng.uniform(*RESIDUAL_MM) / 1000 / root_mean_square(unexplained(outside))
     return template.load().moved(template.load().vertices + basis + outside)
 
@@ -52,13 +52,11 @@ def unexplained(displacement: np.ndarray) -> np.ndarray:
 def _lessened(displacement: np.ndarray) -> np.ndarray:
     """Return the smallest displacement of the whole head that a basis fit to the face leaves as much of.
 
-    What the basis explains may go, but so that the back of the head stays where it is.
+    What the basis explains may go, but so that the back of the head stays where it is. Scaled to leave a root mean
+    square of 1.
     """
-    return _without_basis(displacement, 0.25 + 0.75 * face_weight())
-
-
-def _unit(displacement: np.ndarray) -> np.ndarray:
-    return displacement / root_mean_square(unexplained(displacement))
+    lessened = _without_basis(displacement, 0.25 + 0.75 * face_weight())
+    return lessened / root_mean_square(unexplained(lessened))
 
 
 def _without_basis(displacement: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -77,12 +75,7 @@ def root_mean_square(displacement: np.ndarray) -> float:
 @cache
 def face_weight() -> np.ndarray:
     """Return the share [V] in [0, 1] to which each vertex of the template belongs to the face."""
-    mesh = template.load()
-    return _at_vertices(mesh, template.mask("face", 512))
-
-
-def _at_vertices(mesh: Mesh, picture: np.ndarray) -> np.ndarray:
-    return raster.sample_uv(picture, vertex_uvs(mesh)).astype(np.float64)
+    return raster.sample_uv(template.mask("face", 512), vertex_uvs(template.load())).astype(np.float64)
 
 
 @cache
@@ -100,9 +93,8 @@ def _random_field(rng: np.random.Generator) -> np.ndarray:
     mirrored = points * [-1, 1, 1]
 
     def field(at: np.ndarray, seed: int) -> np.ndarray:
-        return np.stack(
-            [octaves(at, WAVELENGTHS_MM, np.random.default_rng([seed, axis]), smooth=True) for axis in range(3)], 1
-        )
+        rngs = [np.random.default_rng([seed, axis]) for axis in range(3)]
+        return np.stack([octaves(at, WAVELENGTHS_MM, rng, smooth=True) for rng in rngs], 1)
 
     even, odd = rng.integers(2**31, size=2)
     symmetric = field(points, even) + field(mirrored, even) * [-1, 1, 1]

@@ -93,13 +93,13 @@ def trace_truth(
     seen, parts = np.zeros((*hit.shape, 3), np.float32), np.zeros((*hit.shape, len(PARTS)), np.float32)
     seen[hit] = scene.albedo(face[hit], bary[hit], scene.figure.seen)
     parts[hit, scene.part[face[hit]]] = 1
-    skin = hit & (scene.part[np.maximum(face, 0)] == SKIN)
-    lips, facial = (_of_uv(scene, name, face[skin], bary[skin]) for name in ("lips", "face"))
+    part = np.where(hit, scene.part[face], -1)
+    skin = part == SKIN
+    uv = (scene.uv[face[skin]] * bary[skin][..., None]).sum(1)
+    lips, facial = (raster.sample_uv(template.mask(name, 1024), uv) for name in ("lips", "face"))
     parts[skin, LIPS], parts[skin, SKIN] = lips, 1 - lips
-    in_face = np.zeros(hit.shape, np.float32)
-    in_face[skin] = facial
-    in_face[hit & np.isin(scene.part[np.maximum(face, 0)], FACIAL)] = 1
-    dark = np.zeros(hit.shape, np.float32)
+    in_face, dark = np.zeros((2, *hit.shape), np.float32)
+    in_face[skin], in_face[np.isin(part, FACIAL)] = facial, 1
     if sun is not None:
         a, b, c = (scene.whole.mesh.vertices[scene.whole.mesh.faces[face[hit]][:, i]] for i in range(3))
         normal = unit(np.cross(b - a, c - a))
@@ -132,16 +132,11 @@ def _bare(scene: Scene, view: View, over: int) -> tuple[np.ndarray, np.ndarray]:
     """Return albedo and normals [h, w, 3] each, without hair and clothes."""
     face, bary, _ = raster.render_view(scene.body, view, over)
     hit = face >= 0
-    colour, normal = np.zeros((*hit.shape, 3), np.float32), np.zeros((*hit.shape, 3), np.float32)
+    colour, normal = np.zeros((2, *hit.shape, 3), np.float32)
     colour[hit] = scene.albedo(face[hit], bary[hit], scene.figure.skin.diffuse)
     normal[hit] = raster.interpolate(scene.normals, scene.body.mesh.faces, face[hit], bary[hit])
     cover = block_mean(hit.astype(np.float32), over)[..., None]
     return block_mean(colour, over) / np.maximum(cover, 1e-6), unit(block_mean(normal, over))
-
-
-def _of_uv(scene: Scene, name: str, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
-    uv = (scene.uv[face] * bary[..., None]).sum(1)
-    return raster.sample_uv(template.mask(name, 1024), uv)
 
 
 def block_mean(image: np.ndarray, factor: int) -> np.ndarray:
