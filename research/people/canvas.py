@@ -72,10 +72,11 @@ class Canvas:
         """Return values [N(, C)] as a picture [S, S(, C)], bled beyond the charts."""
         return texel_values[self._nearest]
 
-    def soft(self, values_of: Callable[[np.ndarray], np.ndarray], step: int = 4) -> np.ndarray:
-        """Evaluate a function of points [M, 3] in mm, slow over 5 mm or more, at every `step`-th texel: [N]."""
-        shrunk = cv2.resize(self.bled_position, (self.size // step,) * 2, interpolation=cv2.INTER_AREA)
-        small = np.asarray(values_of(shrunk.reshape(-1, 3)), np.float32).reshape(self.size // step, -1)
+    def soft(self, values_of: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Evaluate a function of points [M, 3] in mm, slow over 5 mm or more, at every fourth texel: [N]."""
+        side = self.size // 4
+        shrunk = cv2.resize(self.bled_position, (side, side), interpolation=cv2.INTER_AREA)
+        small = np.asarray(values_of(shrunk.reshape(-1, 3)), np.float32).reshape(side, -1)
         return cv2.resize(small, (self.size,) * 2, interpolation=cv2.INTER_LINEAR)[self.covered]
 
     def near(self, points: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -126,6 +127,22 @@ def make_window_canvas(size: int, row: int, column: int, side: int) -> Canvas:
     return _canvas(mesh, size, face[:, columns], bary[:, columns], template.landmark_points(mesh), mask)
 
 
+def relief_normals(height: np.ndarray, on: Canvas) -> np.ndarray:
+    """Return unit normals float32 [N, 3] (x along +u, y along +v: OpenGL) of a height [N] in mm over the surface.
+
+    The slope is measured along the surface through the UV's metric, with one-sided differences at the charts' borders.
+    """
+    picture = np.zeros((on.size, on.size), np.float32)
+    picture[on.covered] = height
+    along_u = _difference(picture, on.covered, 1)[on.covered]
+    along_v = -_difference(picture, on.covered, 0)[on.covered]  # rows run against v
+    a, b, c = on.metric.T
+    x = along_u / np.maximum(a, 1e-6)
+    y = (along_v - b * x) / np.maximum(c, 1e-6)
+    normal = np.stack([-x, -y, np.ones_like(x)], -1)
+    return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+
 def _canvas(
     mesh: Mesh, size: int, face: np.ndarray, bary: np.ndarray, landmarks: np.ndarray, mask: Callable[[str], np.ndarray]
 ) -> Canvas:
@@ -153,3 +170,16 @@ def _metric(mesh: Mesh, size: int) -> np.ndarray:
     b = (du * dv).sum(1) / a
     c = np.sqrt(np.maximum((dv * dv).sum(1) - b * b, 1e-12))
     return np.stack([a, b, c], 1).astype(np.float32)
+
+
+def _difference(picture: np.ndarray, covered: np.ndarray, axis: int) -> np.ndarray:
+    """Change per texel towards higher indices, from the covered neighbours only."""
+    total, steps = np.zeros_like(picture), np.zeros_like(picture)
+    low = tuple(slice(None, -1) if i == axis else slice(None) for i in range(2))
+    high = tuple(slice(1, None) if i == axis else slice(None) for i in range(2))
+    both = covered[low] & covered[high]
+    change = np.where(both, picture[high] - picture[low], 0)
+    for side in (low, high):
+        total[side] += change
+        steps[side] += both
+    return total / np.maximum(steps, 1)

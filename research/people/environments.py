@@ -28,12 +28,11 @@ SUN_OVER_MEAN = 25.0  # radiance, in means of the panorama, over which a texel i
 class Environment:
     """Light from all directions.
 
-    radiance float32 [LIGHTS, 3], linear, of mean luminance 1; lamp unit [3] towards the brightest light and its colour
-    [3] as irradiance over pi (zeros: none); panorama float32 [WIDTH / 2, WIDTH, 3]: the background.
+    radiance float32 [LIGHTS, 3], linear, of mean luminance 1; colour [3] of the brightest light as irradiance over pi
+    (zeros: none); panorama float32 [WIDTH / 2, WIDTH, 3]: the background.
     """
 
     radiance: np.ndarray
-    lamp: np.ndarray
     colour: np.ndarray
     panorama: np.ndarray
 
@@ -69,9 +68,9 @@ def panorama_environment(panorama: np.ndarray, rng: np.random.Generator) -> Envi
     turned = np.roll(panorama, rng.integers(panorama.shape[1]), 1)
     if rng.random() < 0.5:
         turned = turned[:, ::-1]
-    turned, lamp, colour = without_lamp(turned)
+    turned, _, colour = without_lamp(turned)
     small = cv2.resize(turned, (WIDTH, WIDTH // 2), interpolation=cv2.INTER_AREA)
-    return _normalised(_gathered(turned), lamp, colour, small)
+    return _normalised(_gathered(turned), colour, small)
 
 
 def without_lamp(panorama: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -85,8 +84,8 @@ def without_lamp(panorama: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
     hard = luminance > SUN_OVER_MEAN * mean
     if not hard.any():
         return panorama, np.array([0.0, -0.6, 0.8]), np.zeros(3)
-    kept = SUN_OVER_MEAN * mean * panorama / np.maximum(luminance, 1e-6)[..., None]
-    excess = np.where(hard[..., None], panorama - kept, 0)
+    limit = SUN_OVER_MEAN * mean * panorama / np.maximum(luminance, 1e-6)[..., None]
+    excess = np.where(hard[..., None], panorama - limit, 0)
     lamp = (directions * (excess.mean(-1) * solid)[..., None]).sum((0, 1))
     return panorama - excess, lamp / np.linalg.norm(lamp), (excess * solid[..., None]).sum((0, 1)) / np.pi
 
@@ -105,7 +104,7 @@ def made_environment(rng: np.random.Generator) -> Environment:
         share = np.clip(0.5 + (near - np.cos(size)) / rng.uniform(0.02, 0.4), 0, 1)[..., None]
         strength = np.exp(rng.normal(0.2, 1.1) - 0.5 * np.log(size))
         panorama = panorama * (1 - share) + share * _colour(rng, 0.35) * strength
-    return _normalised(_gathered(panorama), np.array([0.0, -0.6, 0.8]), np.zeros(3), panorama)
+    return _normalised(_gathered(panorama), np.zeros(3), panorama)
 
 
 def background_radiance(environment: Environment, directions: np.ndarray) -> np.ndarray:
@@ -118,10 +117,9 @@ def background_radiance(environment: Environment, directions: np.ndarray) -> np.
     return cv2.remap(panorama, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
-def _normalised(radiance: np.ndarray, lamp: np.ndarray, colour: np.ndarray, panorama: np.ndarray) -> Environment:
+def _normalised(radiance: np.ndarray, colour: np.ndarray, panorama: np.ndarray) -> Environment:
     mean = max(float(radiance.mean()), 1e-6)
-    radiance, colour, panorama = ((light / mean).astype(np.float32) for light in (radiance, colour, panorama))
-    return Environment(radiance, lamp, colour, panorama)
+    return Environment(*((light / mean).astype(np.float32) for light in (radiance, colour, panorama)))
 
 
 def _gathered(panorama: np.ndarray) -> np.ndarray:

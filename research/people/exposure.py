@@ -40,8 +40,8 @@ def phone_exposure(rng: np.random.Generator, skin: np.ndarray, light: np.ndarray
 def _cast(rng: np.random.Generator) -> np.ndarray:
     """Draw the linear gain [3] of luminance about 1 that light and white balance leave on a white surface."""
     kelvin = np.exp(rng.uniform(np.log(2600), np.log(9000)))
-    left = rng.uniform(0.0, 0.35)  # of the light's colour
-    cast = _black_body(kelvin) ** left * np.exp(rng.normal(0, [0.05, 0.02, 0.06]))
+    remaining = rng.uniform(0.0, 0.35)  # of the light's colour
+    cast = _black_body(kelvin) ** remaining * np.exp(rng.normal(0, [0.05, 0.02, 0.06]))
     return cast / (cast @ LUMINANCE)
 
 

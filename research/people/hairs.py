@@ -90,9 +90,9 @@ def _strokes(
     points = roots[hair] + direction[hair] * (along * length[hair])[:, None]
     points[:, 2] += bend[hair] * along**2 * length[hair]
     _, nearest = on.tree.query(points, distance_upper_bound=8.0)  # lays the straight hair onto the surface
-    kept = nearest < len(cover)
-    hair, along, lifted = hair[kept], along[kept], points[kept] - on.position[nearest[kept]]
-    on_surface = on.position[nearest[kept]] + np.clip(lifted, -finest, finest)
+    near = nearest < len(cover)
+    hair, along, lifted = hair[near], along[near], points[near] - on.position[nearest[near]]
+    on_surface = on.position[nearest[near]] + np.clip(lifted, -finest, finest)
     radius = max(width, finest)
     texel, point, distance = on.near(on_surface, np.full(len(on_surface), 1.5 * radius))
     taper = (1 - 0.7 * along[point] ** 2) * rng.uniform(0.6, 1.0, len(roots))[hair[point]]
@@ -101,6 +101,6 @@ def _strokes(
     order = np.lexsort((-share, texel, hair[point]))
     key = hair[point][order].astype(np.int64) * len(cover) + texel[order]
     strongest = order[np.diff(key, prepend=-1) != 0]
-    left = np.zeros(len(cover), np.float64)
-    np.add.at(left, texel[strongest], np.log1p(-np.minimum(share[strongest], 0.95)))
-    return (1 - np.exp(left)).astype(np.float32)
+    log_bare = np.zeros(len(cover), np.float64)
+    np.add.at(log_bare, texel[strongest], np.log1p(-np.minimum(share[strongest], 0.95)))
+    return (1 - np.exp(log_bare)).astype(np.float32)

@@ -69,10 +69,10 @@ def bake(
     normals = unit(raster.interpolate(vertex_normals(mesh), mesh.faces, face, bary))
     caster = raster.RayCaster(mesh)
     ambient = raster.interpolate(_transfer_of(mesh, caster) @ light.sky, mesh.faces, face, bary)
-    seen = _sun_seen(caster, points, normals, light, shadows, rng)
+    free = _sun_seen(caster, points, normals, light, shadows, rng)
     cosine = np.maximum(normals @ light.sun, 0)
-    shading = np.maximum(ambient, 0.005) + (cosine * seen)[:, None] * light.colour
-    shadow = np.where(cosine > 0.02, 1 - seen, 0) * (light.colour.sum() > 0)
+    shading = np.maximum(ambient, 0.005) + (cosine * free)[:, None] * light.colour
+    shadow = np.where(cosine > 0.02, 1 - free, 0) * (light.colour.sum() > 0)
 
     def spread(texel_values: np.ndarray) -> np.ndarray:
         picture = np.zeros((size, size, *texel_values.shape[1:]), np.float32)
@@ -100,18 +100,18 @@ def _sun_seen(
     turn, reach = rng.uniform(0, 2 * np.pi), np.sqrt((np.arange(SUN_RAYS) + 0.5) / SUN_RAYS) * radius
     spiral = np.pi * (1 + 5**0.5) * np.arange(SUN_RAYS) + turn
     directions = unit(sun + (reach * np.cos(spiral))[:, None] * right + (reach * np.sin(spiral))[:, None] * up)
-    seen = np.zeros((SUN_RAYS, len(points)), np.float32)
+    free = np.zeros((SUN_RAYS, len(points)), np.float32)
     facing = np.flatnonzero(normals @ sun > 0)
     for ray, direction in enumerate(directions):
-        seen[ray, facing] = ~caster.blocked(
+        free[ray, facing] = ~caster.blocked(
             points[facing] + 1e-3 * normals[facing], np.repeat(direction[None], len(facing), 0)
         )
     if shadows != "self":
         away = rng.uniform(0.25, 1.0)  # metres to what throws the shadow
         at = points[None, facing] + away * directions[:, None]
-        seen[:, facing] *= 1 - draw_sheet(at @ right, at @ up, away * radius * 2 / SUN_RAYS**0.5, shadows, rng)
+        free[:, facing] *= 1 - draw_sheet(at @ right, at @ up, away * radius * 2 / SUN_RAYS**0.5, shadows, rng)
     share = np.zeros(len(points))
-    share[facing] = seen[:, facing].mean(0)
+    share[facing] = free[:, facing].mean(0)
     return share
 
 

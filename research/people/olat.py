@@ -91,11 +91,11 @@ def trace_sun(
     up = np.cross(right, sun)
     facing = np.flatnonzero(normals @ sun > -0.1)
     origins, turn = points[facing] + LIFT * normals[facing], rng.uniform(0, 2 * np.pi, len(facing))
-    seen = np.zeros(len(facing), np.float32)
+    free = np.zeros(len(facing), np.float32)
     for ray in range(rays):
         reach, angle = radius * np.sqrt((ray + 0.5) / rays), turn + ray * np.pi * (1 + 5**0.5)
         directions = sun + reach * (np.cos(angle)[:, None] * right + np.sin(angle)[:, None] * up)
-        seen += ~caster.blocked(origins, directions / np.linalg.norm(directions, axis=1, keepdims=True))
+        free += ~caster.blocked(origins, directions / np.linalg.norm(directions, axis=1, keepdims=True))
     share = np.zeros(len(points), np.float32)
-    share[facing] = seen / rays
+    share[facing] = free / rays
     return share

@@ -67,8 +67,8 @@ def relight_sight(
     """
     albedo = sight.albedo if albedo is None else albedo
     environment = random_environment(panoramas, rng)
-    carried = transport(stage, sight.vertices)
-    ambient, shine = _under(environment, sight, stage, carried)
+    transfer = transport(stage, sight.vertices)
+    ambient, shine = _under(environment, sight, stage, transfer)
     lamps, reaches = [], []
     for k, colour, lost in draw_lamps(environment, sight.lamps, sight.radius, sight.position, STRONGEST, rng):
         lamps.append(LampOnHead(sight.lamps[k], colour, sight.reach[k]))
@@ -104,20 +104,20 @@ def relight_sight(
         head * bare,
         sight.picture(sight.mask("skin") * (1 - sight.mask("eyes"))) * bare,
         fitted_light(
-            sight.at_pixels(carried @ BASIS.astype(np.float32)), sight.smooth, lamps, environment, tone * gains, rng
+            sight.at_pixels(transfer @ BASIS.astype(np.float32)), sight.smooth, lamps, environment, tone * gains, rng
         ),
     )
 
 
 def _under(
-    environment: Environment, sight: Sight, stage: LightStage, carried: np.ndarray
+    environment: Environment, sight: Sight, stage: LightStage, transfer: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return shading by the environment and its mirror image, [P, 3] each.
 
-    carried: light transport of the sight's vertices.
+    transfer: light transport of the sight's vertices.
     """
     lit = np.concatenate(
-        [carried @ environment.radiance, mirror_environment(stage, sight.vertices, environment.radiance, sight.eye)], 1
+        [transfer @ environment.radiance, mirror_environment(stage, sight.vertices, environment.radiance, sight.eye)], 1
     )
     ambient, shine = np.split(sight.at_pixels(lit), 2, 1)
     # the stage's vertices know no pores: these turn to its bright side
@@ -240,7 +240,7 @@ def _haired(picture: np.ndarray, sight: Sight, rng: np.random.Generator) -> tupl
     colour = np.clip(
         np.array([0.13, 0.09, 0.07]) * np.exp(rng.normal(0.2, 0.9)) * np.exp(rng.normal(0, 0.15, 3)), 0, 0.8
     )
-    drawn, cover = picture.copy(), np.zeros(picture.shape[:2], np.uint8)
+    strands, cover = picture.copy(), np.zeros(picture.shape[:2], np.uint8)
     fringe, sides = rng.uniform(0.05, 0.35), rng.uniform(0.1, 0.9)
     for _ in range(int(rng.integers(150, 500))):
         u = rng.uniform(-1, 1)
@@ -251,10 +251,10 @@ def _haired(picture: np.ndarray, sight: Sight, rng: np.random.Generator) -> tupl
         strand = start + t * along + np.sin(3 * t + rng.uniform(0, 6)) * 0.01 * height
         points = [np.round(strand * 8).astype(np.int32)]
         thick = max(1, round(rng.uniform(0.6, 2.2) * sight.size / 256))
-        cv2.polylines(drawn, points, False, (colour * np.exp(rng.normal(0, 0.35))).tolist(), thick, cv2.LINE_AA, 3)
+        cv2.polylines(strands, points, False, (colour * np.exp(rng.normal(0, 0.35))).tolist(), thick, cv2.LINE_AA, 3)
         cv2.polylines(cover, points, False, 1, thick, cv2.LINE_8, 3)
     covered = cv2.dilate(cover, np.ones((3, 3), np.uint8))
-    return np.where(covered[..., None] > 0, drawn, picture).astype(np.float32), covered.astype(np.float32)
+    return np.where(covered[..., None] > 0, strands, picture).astype(np.float32), covered.astype(np.float32)
 
 
 def _shadow(

@@ -101,10 +101,10 @@ def lid_lines(on: Canvas) -> np.ndarray:
 
 def _blobs(points: np.ndarray, landmarks: np.ndarray, blobs: list[tuple[int, float]]) -> np.ndarray:
     """Return one minus the product of what each Gaussian leaves, [M]."""
-    left = np.ones(len(points), np.float32)
+    remainder = np.ones(len(points), np.float32)
     for landmark, radius in blobs:
-        left *= 1 - _gaussian(points, landmarks[landmark], radius)
-    return 1 - left
+        remainder *= 1 - _gaussian(points, landmarks[landmark], radius)
+    return 1 - remainder
 
 
 def _around(points: np.ndarray, centres: np.ndarray, radius: float) -> np.ndarray:

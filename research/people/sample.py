@@ -66,16 +66,15 @@ def render_frames(
     leaves: bool = True,
     light: scene.SceneLight | None = None,
     suffix: str = ".png",
-    head: Mesh | None = None,
 ) -> None:
     """Render a bald subject by Cycles to work/NNNNN.png; existing files stay.
 
     leaves: between the sun and the head; light: instead of the sample's sun, sky and leaves; suffix: .exr for linear
-    light; head: of the built-in topology, instead of the subject's own.
+    light.
     """
     sun = scene.sun_of(seed)
     light = light or scene.SceneLight(scene.SKY, sun, scene.strew_leaves(seed, sun) if leaves else None)
-    mesh = head or subject_mesh(seed)
+    mesh = subject_mesh(seed)
     mesh = mesh.moved(mesh.vertices.round(6))  # to a micrometre, as the sample and all records were rendered
     parts = {"head": write_skin(work, mesh, skin.diffuse, skin.specular, skin.normal)}
     render_parts(work, seed, parts, [], light, shot, suffix, torso=True)

@@ -84,20 +84,19 @@ def sun_of(seed: int) -> Sun:
     return Sun(np.array([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)]))
 
 
-def strew_leaves(seed: int, sun: Sun, distance: float = 0.40, count: int = 28, reach: float = 0.15) -> Mesh:
+def strew_leaves(seed: int, sun: Sun) -> Mesh:
     """Strew a loose twig between head and sun: pointed leaves 2.4 to 5.6 cm long over a disc across the beam.
 
-    distance from the head and reach, the disc's radius, in metres; at 0.4 the sun blurs the edges over 2 mm: hard
-    shadows, as at noon under a tree.
+    At 0.4 m from the head the sun blurs the edges over 2 mm: hard shadows, as at noon under a tree.
     """
     rng = np.random.default_rng([seed, 21])
     side = np.cross(sun.direction, [0, 0, 1.0])
     side /= np.linalg.norm(side)
     up = np.cross(side, sun.direction)
     vertices, faces = [], []
-    for _ in range(count):
-        a, r = rng.uniform(0, 2 * np.pi), reach * np.sqrt(rng.uniform())
-        centre = sun.direction * (distance + rng.uniform(-0.06, 0.06)) + side * r * np.cos(a) + up * r * np.sin(a)
+    for _ in range(28):
+        a, r = rng.uniform(0, 2 * np.pi), 0.15 * np.sqrt(rng.uniform())
+        centre = sun.direction * (0.40 + rng.uniform(-0.06, 0.06)) + side * r * np.cos(a) + up * r * np.sin(a)
         turn, length, width = rng.uniform(0, 2 * np.pi), rng.uniform(0.012, 0.028), rng.uniform(0.004, 0.010)
         along, over = side * np.cos(turn) + up * np.sin(turn), up * np.cos(turn) - side * np.sin(turn)
         over = over + sun.direction * rng.uniform(-0.6, 0.6)
@@ -108,15 +107,15 @@ def strew_leaves(seed: int, sun: Sun, distance: float = 0.40, count: int = 28, r
     return Mesh(np.array(vertices), np.array(faces))
 
 
-def camera_path(seed: int, frames: int, degrees: float = 46) -> np.ndarray:
+def camera_path(seed: int, frames: int) -> np.ndarray:
     """Return camera-to-world matrices [frames, 4, 4] of a hand-held pass (the camera looks along its -z, y up).
 
-    Past the nose from so many degrees at one side to as many at the other, up and down on the way, with the slow drift
-    and the tremble of a hand.
+    Past the nose from 46 degrees at one side to as many at the other, up and down on the way, with the slow drift and
+    the tremble of a hand.
     """
     rng = np.random.default_rng([seed, 22])
     t = np.linspace(0, 1, frames)
-    azimuth = np.radians(degrees) * (0.8 * (2 * t - 1) + 0.2 * np.sin(np.pi * (t - 0.5))) * rng.choice([-1, 1])
+    azimuth = np.radians(46) * (0.8 * (2 * t - 1) + 0.2 * np.sin(np.pi * (t - 0.5))) * rng.choice([-1, 1])
     height = np.radians(7 + 13 * np.sin(2 * np.pi * (1.5 * t + 0.1)))
     distance = DISTANCE * (1 + 0.05 * np.sin(2 * np.pi * (1.2 * t + rng.uniform())))
     direction = np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)

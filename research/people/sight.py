@@ -228,8 +228,8 @@ def _open_eyes(
         for where, colour in ((lid, SCLERA), (ring, iris), (pupil, PUPIL), (lash > 0, LASH)):
             albedo[where[hit]] = colour
         gloss[lid[hit]] = 0.035
-        drawn = (lid | (lash > 0))[hit]
-        masks[drawn, MASKS.index("eyes")], masks[drawn, MASKS.index("skin")] = 1, 0
+        opening_mask = (lid | (lash > 0))[hit]
+        masks[opening_mask, MASKS.index("eyes")], masks[opening_mask, MASKS.index("skin")] = 1, 0
 
 
 def _filled(shape: tuple[int, int], outline: np.ndarray) -> np.ndarray:

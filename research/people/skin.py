@@ -15,10 +15,9 @@ import numpy as np
 from core.geometry.noise import noise, octaves
 
 from . import adornment, hairs, pigment
-from .canvas import Canvas, canvas
+from .canvas import Canvas, canvas, relief_normals
 from .parameters import SkinParameters, sample_parameters
 from .regions import creases, lid_lines, regions
-from .relief import normals
 from .spots import splat_moles, splat_spots, strew
 
 GROUND = 512  # size of the canvas on which marks are strewn, whatever the size of the maps
@@ -42,8 +41,8 @@ class Skin:
 
 def make_skin(parameters: SkinParameters | int, size: int = 1024) -> Skin:
     """Make the skin of parameters or of a seed; the same parameters and size give the same bytes."""
-    known = parameters if isinstance(parameters, SkinParameters) else sample_parameters(parameters)
-    return paint_skin(known, canvas(size), canvas(GROUND))
+    subject = parameters if isinstance(parameters, SkinParameters) else sample_parameters(parameters)
+    return paint_skin(subject, canvas(size), canvas(GROUND))
 
 
 def paint_skin(
@@ -80,7 +79,7 @@ def paint_skin(
         on.spread(np.clip(diffuse, 0, 1)),
         on.spread(specular),
         on.spread(height.astype(np.float32)),
-        on.spread(normals(height, on)),
+        on.spread(relief_normals(height, on)),
         on.covered,
     )
 

@@ -38,13 +38,6 @@ def test_a_floor_takes_half_the_light_of_a_wall():
     assert shading[np.abs(height) < 0.02].mean() == pytest.approx(0.5, abs=0.02)
 
 
-def test_a_mirror_image_of_an_even_environment_is_even():
-    stage = olat.light_stage(ball())
-    facing, even = np.flatnonzero(stage.normals[:, 1] < -0.8), 2 * np.ones((olat.LIGHTS, 3), np.float32)
-    back = olat.mirror_environment(stage, facing, even, np.array([0, -1.0, 0]))
-    assert back == pytest.approx(2, rel=0.05)
-
-
 def test_a_lamp_half_hidden_by_an_edge_gives_half_its_light():
     """A wall that ends on the line to the middle of the lamp hides half of its disc; farther away from the wall the
     whole disc is seen."""

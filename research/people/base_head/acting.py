@@ -15,7 +15,7 @@ import scipy.sparse as sparse
 import torch
 from scipy.spatial import cKDTree
 
-from .makehuman import Base, HeadBuilder, catmull_clark, edge_numbers, to_our_axes
+from .makehuman import Base, HeadBuilder, catmull_clark, edge_numbers, sides, to_our_axes
 
 SKIN, EYES, MOUTH, TEETH = range(4)
 """Material slots."""
@@ -146,20 +146,18 @@ def _split(base: Base, builder: HeadBuilder) -> tuple[list, list, np.ndarray, sp
     ).tocsr()
 
     def grown(polygon):
-        return [
-            i for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True) for i in (int(a), *extra.get((a, b), ()))
-        ]
+        return [i for a, b in sides(polygon) for i in (int(a), *extra.get((a, b), ()))]
 
     cavities = torch.load(base.folder / "template_mesh_internal_cavities.pth", weights_only=True)
-    inner = [base.faces[int(i)] for i in cavities["face_indices"]]
+    inner = [base.faces["body"][int(i)] for i in cavities["face_indices"]]
     near = {i for lids in builder.lids.values() for rim in lids for i in rim.tolist()}
     socket = [f for f in inner if base.vertices[list(f), 1].min() > 7.05]
-    kept = [f for f in inner if base.vertices[list(f), 1].min() <= 7.05]
+    lining = [f for f in inner if base.vertices[list(f), 1].min() <= 7.05]
     for _ in range(SOCKET_RINGS):
         ring = [f for f in socket if near.intersection(f)]
         near |= {i for f in ring for i in f}
-    kept += ring
-    return [grown(p) for p in builder.open_polygons()], [grown(p) for p in kept], parent, extended
+    lining += ring
+    return [grown(p) for p in builder.open_polygons()], [grown(p) for p in lining], parent, extended
 
 
 def _targets(
@@ -170,7 +168,7 @@ def _targets(
     coarse[builder.used] = np.arange(len(builder.used))
     welded = [[int(coarse[parent[i]]) for i in p] for p in polygons]
     edges = edge_numbers(welded)
-    outer_edges = {(min(a, b), max(a, b)) for p in polygons for a, b in zip(p, p[1:] + p[:1], strict=True)}
+    outer_edges = {(min(a, b), max(a, b)) for p in polygons for a, b in sides(p)}
     outer = {i for p in polygons for i in p}
     points = [coarse[parent[i]] if i in outer else -1 for i in used]
     middles = []
@@ -268,7 +266,7 @@ def _jaws(base: Base, body: np.ndarray) -> list[_Part]:
         members = base.groups[group]
         count, number = len(members), np.full(len(base.vertices), -1)
         number[members] = np.arange(count)
-        faces = np.array([[number[i] for i in f] + [-1] * (4 - len(f)) for f in base.helper_faces(group)])
+        faces = np.array([[number[i] for i in f] + [-1] * (4 - len(f)) for f in base.faces[group]])
         matrix = sparse.csr_matrix((np.ones(count), (np.arange(count), members)), shape=(count, len(base.vertices)))
         vertices, uv = base.place(matrix @ body, body), np.full((count, 2), 0.5)
         parts.append(_Part(vertices, faces, uv, np.full(count, JAWS), np.full(len(faces), slot), matrix))

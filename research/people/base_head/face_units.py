@@ -51,8 +51,8 @@ def face_units(base: Base, head: ActingHead, body: np.ndarray) -> dict[str, np.n
 
     On eyes that are open where it is a unit of the eye.
     """
-    opened, left = opening(base, head, body), head.rest[:, :1] > 0  # eyes are far from the middle
-    units = {"eyesOpenLeft": opened * left, "eyesOpenRight": opened * ~left}
+    open_lids, left = opening(base, head, body), head.rest[:, :1] > 0  # eyes are far from the middle
+    units = {"eyesOpenLeft": open_lids * left, "eyesOpenRight": open_lids * ~left}
     for path in sorted((base.folder / "faceunits01/targets/faceunits").glob("*.target")):
         name = path.name.split(".")[0]
         if name.startswith("eyeBlink"):

@@ -40,12 +40,12 @@ _LEFT_OUT = re.compile(
 )
 
 
-def identity_space(base: Base, builder: HeadBuilder, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def identity_space(base: Base, builder: HeadBuilder) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean head [V, 3] in metres, exactly symmetric, and displacements [K, V, 3], largest first.
 
     One standard deviation each.
     """
-    heads = np.stack([builder.head(body) for body in bodies(base, SAMPLES, seed)])
+    heads = np.stack([builder.head(body) for body in bodies(base, SAMPLES)])
     front = (heads[0, :, 1] < 0.045) & (heads[0, :, 2] > -0.12)
     heads = np.stack([_aligned(head, heads[0], front) for head in heads])
     mirrored = heads[:, builder.mirror] * [-1, 1, 1]

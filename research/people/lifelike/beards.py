@@ -82,7 +82,7 @@ def _moustache(on: Canvas) -> np.ndarray:
     return beard_region(on) * np.clip((corner[0] + 7 - x) / 6, 0, 1) * np.clip((z - corner[2] + 1) / 5, 0, 1)
 
 
-def _sideburns(on: Canvas, radius: float = 9.0) -> np.ndarray:
+def _sideburns(on: Canvas) -> np.ndarray:
     """Return closeness [N] in [0, 1] to the lines before the ears."""
     lines = [
         on.landmarks[a] + t * (on.landmarks[b] - on.landmarks[a])
@@ -92,7 +92,7 @@ def _sideburns(on: Canvas, radius: float = 9.0) -> np.ndarray:
     ]
     forward = np.array([0, -9.0, 0])
     square = np.min([((on.position - at - forward) ** 2).sum(1) for at in lines], axis=0)
-    return np.exp(-0.5 * square / radius**2).astype(np.float32)
+    return np.exp(-0.5 * square / 9.0**2).astype(np.float32)
 
 
 def _ways(on: Canvas) -> np.ndarray:

@@ -115,8 +115,8 @@ def photograph_eye(
 
     picture, shares = photograph(shown, rng, panoramas, mirrored)
     before = sight.unlit.shares[..., :-1].astype(np.float32).sum(-1) / 255
-    left = np.clip(shares[..., :-1].sum(-1) / np.maximum(before, 1e-3), 0, 1)  # by what lies before it
-    return _bent(picture, ball * left[..., None], rng)
+    uncovered = np.clip(shares[..., :-1].sum(-1) / np.maximum(before, 1e-3), 0, 1)  # by what lies before it
+    return _bent(picture, ball * uncovered[..., None], rng)
 
 
 def save(path: Path, sight: EyeSight) -> None:
@@ -151,8 +151,8 @@ def _coloured(albedo: np.ndarray, ball: np.ndarray, corners: np.ndarray, rng: np
     white, iris = ball[..., :1], ball[..., 1:]
     log += white * (rng.normal(0.15, 0.3) + rng.normal(0, [0.03, 0.07, 0.09]))
     if rng.random() < 0.7:
-        seen = iris[..., 0] > 0.9
-        mean = albedo[seen].mean(0) if seen.any() else np.array([0.03, 0.02, 0.01])
+        inside = iris[..., 0] > 0.9
+        mean = albedo[inside].mean(0) if inside.any() else np.array([0.03, 0.02, 0.01])
         goal = IRISES[rng.integers(len(IRISES))] * np.exp(rng.normal(0, 0.3)) * np.exp(rng.normal(0, 0.12, 3))
         log += iris * np.log(goal / np.maximum(mean, 0.003))
     lids = 1 - ball.sum(-1)
@@ -172,23 +172,23 @@ def _with_reflections(
     radiance: np.ndarray, ball: np.ndarray, width: float, light: float, rng: np.random.Generator
 ) -> np.ndarray:
     """Add the reflections on a wet ball: a window with its bars, lamps."""
-    seen = ball.sum(-1)
-    if seen.max() < 0.5:
+    cover = ball.sum(-1)
+    if cover.max() < 0.5:
         return radiance
     middle = np.average(
-        np.indices(seen.shape).reshape(2, -1).T[:, ::-1],
+        np.indices(cover.shape).reshape(2, -1).T[:, ::-1],
         axis=0,
         weights=(ball[..., 1] + 0.05 * ball[..., 0]).ravel() + 1e-9,
     )
-    glare = np.zeros_like(seen)
+    glare = np.zeros_like(cover)
     for _ in range(rng.integers(0, 4)):
         at = middle + rng.normal(0, 0.12 * width, 2)
         half = width * np.exp(rng.uniform(*np.log([0.008, 0.09]), 2))
         turn = rng.normal(0, 0.2) if rng.random() < 0.7 else rng.uniform(0, np.pi)
         box = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
         outline = at + box @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
-        glare = np.maximum(glare, fill_outline(seen.shape, outline + 0.5) * rng.uniform(0.05, 2.0))
-    glare = cv2.GaussianBlur(glare, (0, 0), rng.uniform(0.3, 1.2)) * seen
+        glare = np.maximum(glare, fill_outline(cover.shape, outline + 0.5) * rng.uniform(0.05, 2.0))
+    glare = cv2.GaussianBlur(glare, (0, 0), rng.uniform(0.3, 1.2)) * cover
     return radiance + np.float32(light) * glare[..., None]
 
 

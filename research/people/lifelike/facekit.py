@@ -42,18 +42,18 @@ def fields(folder: Path) -> np.ndarray:
     mesh = template.load()
     ours = template.landmark_points(mesh)[list(OURS)]
     scale, turn, shift = _similarity(ours, marks)
-    placed = scale * ours[JAW:] @ turn.T + shift
-    warp = RBFInterpolator(placed, marks[JAW:] - placed, smoothing=1e-3)
-    placed = scale * mesh.vertices @ turn.T + shift
+    aligned = scale * ours[JAW:] @ turn.T + shift
+    warp = RBFInterpolator(aligned, marks[JAW:] - aligned, smoothing=1e-3)
+    aligned = scale * mesh.vertices @ turn.T + shift
     # centimetres: away from the landmarks the warp knows nothing
-    fade = np.exp(-((cKDTree(marks).query(placed)[0] / 6.0) ** 2))[:, None]
-    distance, nearest = cKDTree(neutral[:FACE_AND_HEAD]).query(placed + fade * warp(placed), NEIGHBOURS)
+    fade = np.exp(-((cKDTree(marks).query(aligned)[0] / 6.0) ** 2))[:, None]
+    distance, nearest = cKDTree(neutral[:FACE_AND_HEAD]).query(aligned + fade * warp(aligned), NEIGHBOURS)
     weight = 1 / (distance + 0.05)
     weight /= weight.sum(1, keepdims=True)
     displacements = []
     for path in sorted(model.glob("identity*.obj")):
-        moved = (_vertices(path) - neutral)[nearest]
-        displacements.append((weight[..., None] * moved).sum(1) @ turn / scale)
+        offsets = (_vertices(path) - neutral)[nearest]
+        displacements.append((weight[..., None] * offsets).sum(1) @ turn / scale)
     return np.stack(displacements)
 
 

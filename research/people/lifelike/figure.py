@@ -53,11 +53,11 @@ def make_figure(person: Person | int, size: int = 2048, facekit: Path | None = N
     """Make a person, or the one of a seed, with maps of `size` texels; the same arguments give the same bytes."""
     person = person if isinstance(person, Person) else sample_person(person)
     head = person_mesh(person.seed, facekit)
-    opened = open_lids(head, person.openness if person.openness >= OPENEST else 0.0, np.array(person.gaze))
-    skin, seen, growth = paint(person, size)
+    open_head = open_lids(head, person.openness if person.openness >= OPENEST else 0.0, np.array(person.gaze))
+    skin, albedo, growth = paint(person, size)
     cloth = shirt(person, head)
-    eye = eyes.paint_eyes(np.array(person.iris), opened.balls[0].radius, person.seed)
-    return Figure(person, head, opened, cloth, skin, seen, eye, growth, grow_hair(person, head, opened, cloth))
+    eye = eyes.paint_eyes(np.array(person.iris), open_head.balls[0].radius, person.seed)
+    return Figure(person, head, open_head, cloth, skin, albedo, eye, growth, grow_hair(person, head, open_head, cloth))
 
 
 def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.ndarray]]:

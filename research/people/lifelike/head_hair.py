@@ -96,8 +96,8 @@ def _gathered(points: np.ndarray) -> np.ndarray:
     reach = np.linalg.norm(across / GATHER[:2], axis=-1)
     hangs = np.clip((0.04 - z) / 0.04, 0, 1) * np.clip((z + 0.15) / 0.05, 0, 1)
     over = np.maximum(reach - 1, 0)
-    kept = np.where(over > 0, (1 + GATHER[2] * np.tanh(over / GATHER[2])) / np.maximum(reach, 1e-9), 1)
-    scale = 1 + hangs * (kept - 1)
+    factor = np.where(over > 0, (1 + GATHER[2] * np.tanh(over / GATHER[2])) / np.maximum(reach, 1e-9), 1)
+    scale = 1 + hangs * (factor - 1)
     return np.stack([x * scale, AXIS[1] + across[..., 1] * scale, z], -1).astype(np.float32)
 
 
@@ -134,5 +134,5 @@ def _beside_the_face(points: np.ndarray) -> np.ndarray:
     inside = np.clip((FACE[1] - y) / 0.01, 0, 1) * below
     aside = np.where(x < 0, -1, 1) * np.maximum(np.abs(x), FACE[0] + 0.006 * np.abs(np.sin(700 * x)))
     behind = np.maximum(y, FACE[1] - 0.008)
-    moved = [x * (1 - inside) + aside * inside, y * (1 - inside) + behind * inside, z]
-    return np.stack(moved, -1).astype(np.float32)
+    places = [x * (1 - inside) + aside * inside, y * (1 - inside) + behind * inside, z]
+    return np.stack(places, -1).astype(np.float32)

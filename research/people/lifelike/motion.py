@@ -32,16 +32,15 @@ def sample_sway(frames: int, millimetres: float, degrees: float, rng: np.random.
     return poses
 
 
-def measure_image_motion(
-    caster: raster.RayCaster, views: tuple[View, View, View], poses: np.ndarray, coarse: float = 0.125
-) -> np.ndarray:
+def measure_image_motion(caster: raster.RayCaster, views: tuple[View, View, View], poses: np.ndarray) -> np.ndarray:
     """Return the motion of each pixel of the middle view in a frame's time, float32 [H, W, 2] in pixels.
 
     All but the head stands still. caster: of the head, in its own axes; views: of the frame before, this one and the
-    one after, in the world; poses [3, 4, 4]: head to world; computed at `coarse` of the view's size.
+    one after, in the world; poses [3, 4, 4]: head to world. Computed at an eighth
+    of the size.
     """
     before, now, after = views
-    width, height = round(now.width * coarse), round(now.height * coarse)
+    width, height = round(now.width / 8), round(now.height / 8)
     y, x = np.mgrid[0:height, 0:width]
     pixels = (np.stack([x.ravel(), y.ravel()], -1) + 0.5) * [now.width / width, now.height / height]
     rays = now.rays(pixels)
@@ -51,11 +50,11 @@ def measure_image_motion(
     )
     head = np.isfinite(depth)
     points = now.centre + rays * np.where(head, depth, FAR_M)[:, None]
-    moved = []
+    ends = []
     for view, pose in ((before, poses[0]), (after, poses[2])):
         step = pose @ back
-        moved.append(view.project(np.where(head[:, None], points @ step[:3, :3].T + step[:3, 3], points))[0])
-    flow = ((moved[1] - moved[0]) / 2).reshape(height, width, 2).astype(np.float32)
+        ends.append(view.project(np.where(head[:, None], points @ step[:3, :3].T + step[:3, 3], points))[0])
+    flow = ((ends[1] - ends[0]) / 2).reshape(height, width, 2).astype(np.float32)
     return cv2.resize(flow, (now.width, now.height), interpolation=cv2.INTER_LINEAR)
 
 

@@ -36,7 +36,6 @@ class Person:
 
     seed: int
     skin: SkinParameters
-    male: bool
     iris: tuple[float, float, float]
     openness: float
     gaze: tuple[float, float]
@@ -77,7 +76,6 @@ def sample_person(seed: int) -> Person:
     return Person(
         seed=seed,
         skin=bare,
-        male=male,
         iris=_tuple(iris * np.exp(rng.normal(0, 0.2))),
         openness=0.0 if rng.random() < 0.2 else float(rng.uniform(0.72, 0.98)),
         gaze=(float(np.clip(rng.normal(0, 3), -6, 6)), float(np.clip(rng.normal(0, 2), -4, 4))),

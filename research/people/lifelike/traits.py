@@ -55,14 +55,6 @@ def shaded(person: Person, on: Canvas, diffuse: np.ndarray) -> np.ndarray:
     return beard_shadow(diffuse, np.clip(beard_region(on) * 0.8 * person.shade * uneven, 0, 1))
 
 
-def symmetry(field: np.ndarray, on: Canvas) -> float:
-    """Return the share of a field's variance [N] over the bare skin that is alike on both sides."""
-    picture, skin = on.spread(field), on.spread(regions(on)["bald"])
-    even, odd = (picture + picture[:, ::-1]) / 2, (picture - picture[:, ::-1]) / 2
-    variance = [float(np.average((half - np.average(half, weights=skin)) ** 2, weights=skin)) for half in (even, odd)]
-    return variance[0] / sum(variance)
-
-
 def _shaded(on: Canvas, rng: np.random.Generator) -> np.ndarray:
     """Draw the lack of melanin [N] where a hat, glasses and a collar keep the sun off."""
     position, at = on.position, on.landmarks

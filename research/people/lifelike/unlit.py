@@ -164,12 +164,12 @@ def _shares(scene: Scene, triangle: np.ndarray, weight: np.ndarray) -> np.ndarra
     skin = np.flatnonzero(labels == GROWN.index("skin"))
     uv = (scene.uv[triangle[skin]] * weight[skin, :, None]).sum(1)
     at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1)
-    left = np.ones(len(skin), np.float32)
+    remainder = np.ones(len(skin), np.float32)
     for name, where in (("lips", template.mask("lips", 1024)), *scene.figure.growth.items()):
-        share = left * np.clip(raster.sample(where, at * len(where)), 0, 1)
+        share = remainder * np.clip(raster.sample(where, at * len(where)), 0, 1)
         shares[skin, PARTS.index(name)] = share
-        left = left - share
-    shares[skin, PARTS.index("skin")] = left
+        remainder = remainder - share
+    shares[skin, PARTS.index("skin")] = remainder
     return shares
 
 
