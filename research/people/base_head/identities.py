@@ -15,14 +15,15 @@ from .makehuman import Base, HeadBuilder
 
 COMPONENTS = 40  # principal directions that are kept
 SAMPLES = 700  # heads that they are told from
-_OPPOSITES = (
-    ("decr", "incr"),
-    ("down", "up"),
-    ("in", "out"),
-    ("backward", "forward"),
-    ("compress", "uncompress"),
-    ("concave", "convex"),
-)
+_HIGH = {
+    "decr": "incr",
+    "down": "up",
+    "in": "out",
+    "backward": "forward",
+    "compress": "uncompress",
+    "concave": "convex",
+}
+_LOW = {high: low for low, high in _HIGH.items()}
 _FOLDERS = {
     "head": 0.17,
     "forehead": 0.25,
@@ -76,15 +77,13 @@ def _controls(base: Base) -> list[tuple[float, list[np.ndarray]]]:
             stem = re.sub(r"/[lr]-", "/", name)
             if not _LEFT_OUT.search(name):
                 targets[stem] = targets.get(stem, 0) + base.target(name)
-        for stem in list(targets):
-            for low, high in _OPPOSITES:
-                if stem.endswith("-" + low) and stem[: -len(low)] + high in targets:
-                    controls.append((sigma, [targets[stem], targets[stem[: -len(low)] + high]]))
-                    break
-                if stem.endswith("-" + high) and stem[: -len(high)] + low in targets:
-                    break
-            else:
-                controls.append((sigma, [targets[stem]]))
+        for stem, target in targets.items():
+            part, _, end = stem.rpartition("-")
+            low, high = (f"{part}-{ends.get(end)}" for ends in (_LOW, _HIGH))
+            if high in targets:
+                controls.append((sigma, [target, targets[high]]))
+            elif low not in targets:
+                controls.append((sigma, [target]))
     return controls
 
 

@@ -29,7 +29,8 @@ def unwrap(
     uv = _mean_value_embedding(points, cut_faces, start)
     uv = _symmetric(uv, twin)
     uv = _minimise(uv, cut_faces, rest, fixed, twin, steps)
-    assert (_areas(uv, cut_faces) > 0).all(), "the unwrap overlaps"
+    a, b = uv[cut_faces[:, 1]] - uv[cut_faces[:, 0]], uv[cut_faces[:, 2]] - uv[cut_faces[:, 0]]
+    assert (a[:, 0] * b[:, 1] > a[:, 1] * b[:, 0]).all(), "the unwrap overlaps"
     return uv, cut_faces
 
 
@@ -190,8 +191,3 @@ def _symmetric(uv, twin, offset: float = 1.0):
     """Average with the mirror image about u = 0.5 (offset 1) or, for directions, about 0 (offset 0)."""
     other = uv[twin] * [-1, 1] + [offset, 0]
     return (uv + other) / 2
-
-
-def _areas(uv, faces):
-    a, b = uv[faces[:, 1]] - uv[faces[:, 0]], uv[faces[:, 2]] - uv[faces[:, 0]]
-    return (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
