@@ -1,4 +1,3 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Synthetic subjects whose truth is known: head shapes, procedural skin, light. They feed training, tests and the
-demo."""
+"""Synthetic subjects of known truth for training, tests and the demo: head shapes, procedural skin, light."""

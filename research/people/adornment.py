@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What only some faces have: scars, and make-up on lips, lids, lashes and cheeks."""
+"""Scars, and make-up on lips, lids, lashes and cheeks."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ SHADOWS = np.array([[0.10, 0.06, 0.05], [0.05, 0.04, 0.06], [0.20, 0.11, 0.08], 
 
 
 class Scars(NamedTuple):
-    """What scars add, float32 [N] each: to the logarithms of melanin (stain) and of blood (flush), and to the height in
-    mm (ridge)."""
+    """Effect of scars, float32 [N]: on the logarithms of melanin (stain) and blood (flush), on height in mm (ridge)."""
 
     stain: np.ndarray
     flush: np.ndarray
@@ -29,21 +28,13 @@ class Scars(NamedTuple):
 
 
 def paint_scars(on: Canvas, ground: Canvas, expected: float, rng: np.random.Generator) -> Scars:
-    """Thin lines of 4 to 20 mm on the bare skin of face and neck, old ones pale, young ones red, sunken or raised.
+    """Draw scars: thin lines of 4 to 20 mm on bare face and neck, old pale ones and young red ones.
 
-    Parameters
-    ----------
-    on : what is painted on
-    ground : of the same head, GROUND texels wide: where they begin
-    expected : their mean number
-    rng : draws them
+    They begin on `ground`, GROUND texels wide, of the same head; `expected` is their mean number.
     """
-    nothing = np.zeros(len(on.position), np.float32)
-    if expected <= 0:
-        return Scars(nothing, nothing, nothing)
     room = regions(ground)["bald"] * (1 - regions(ground)["ears"])
     begins, texel = strew(ground, expected * room / float((ground.area * room).sum()), rng)
-    stain, flush, ridge = nothing.copy(), nothing.copy(), nothing.copy()
+    stain, flush, ridge = np.zeros((3, len(on.position)), np.float32)
     for begin, normal in zip(begins, ground.normal[texel], strict=True):
         way = np.cross(normal, rng.normal(size=3))
         along = np.linspace(0, 1, 60)[:, None]
@@ -59,48 +50,34 @@ def paint_scars(on: Canvas, ground: Canvas, expected: float, rng: np.random.Gene
     return Scars(stain, flush, ridge)
 
 
-def lid_distance(on: Canvas) -> np.ndarray:
-    """Closeness [N] in [0, 1] to the line where the lids meet: 1 on it, 0 from about 2 mm on."""
+def put_on_make_up(diffuse: np.ndarray, on: Canvas, amount: float, rng: np.random.Generator) -> np.ndarray:
+    """Paint lipstick, eye shadow, liner and blusher, each worn or not, on the linear albedo [N, 3] of a canvas.
+
+    amount in [0, 1]: maximum strength.
+    """
+    if amount <= 0:
+        return diffuse
+    area = regions(on)
+    worn = amount * (rng.random(4) < [0.8, 0.5, 0.5, 0.6]) * rng.uniform(0.4, 1.0, 4)
+    light = diffuse.mean() / 0.25  # the colours are for middling skin
+    lipstick = LIPSTICKS[rng.integers(len(LIPSTICKS))] * light**0.3
+    shadow = SHADOWS[rng.integers(len(SHADOWS))] * light**0.6
+    out = _coat(diffuse, lipstick, 0.9 * worn[0] * np.clip(area["lips"] * 1.3, 0, 1))
+    out = _coat(out, shadow, 0.6 * worn[1] * np.clip(area["eyelids"] + 0.5 * area["sockets"], 0, 1))
+    out = _coat(out, np.array([0.015, 0.012, 0.012]), 0.9 * worn[2] * _lid_line(on))
+    return out * (1 - worn[3] * area["cheeks"][:, None] * np.array([0.05, 0.28, 0.22])).astype(np.float32)
+
+
+def _lid_line(on: Canvas) -> np.ndarray:
+    """Return closeness [N] in [0, 1] to the line where the lids meet: 1 on it, 0 from about 2 mm on."""
     if "lid line" not in on.cache:
         lids = lid_lines(on)
         on.cache["lid line"] = splat_spots(on, lids, np.full(len(lids), 1.0), np.ones(len(lids)))
     return on.cache["lid line"]
 
 
-def put_on_make_up(
-    diffuse: np.ndarray, area: dict[str, np.ndarray], lids: np.ndarray, amount: float, rng: np.random.Generator
-) -> np.ndarray:
-    """Each of lipstick, eye shadow, liner and blusher is worn or not, at random.
-
-    Parameters
-    ----------
-    diffuse : [N, 3], linear albedo
-    area : `regions` of the canvas
-    lids : [N], `lid_distance` of the canvas
-    amount : in [0, 1], strength at most; 0 is none
-    rng : what is worn, how strong and of which colour
-
-    Returns
-    -------
-    [N, 3], linear albedo.
-    """
-    if amount <= 0:
-        return diffuse
-    worn = amount * (rng.random(4) < [0.8, 0.5, 0.5, 0.6]) * rng.uniform(0.4, 1.0, 4)
-    light = diffuse.mean() / 0.25  # the colours are for middling skin
-    lipstick, shadow = (
-        LIPSTICKS[rng.integers(len(LIPSTICKS))] * light**0.3,
-        SHADOWS[rng.integers(len(SHADOWS))] * light**0.6,
-    )
-    out = _coat(diffuse, lipstick, 0.9 * worn[0] * np.clip(area["lips"] * 1.3, 0, 1))
-    out = _coat(out, shadow, 0.6 * worn[1] * np.clip(area["eyelids"] + 0.5 * area["sockets"], 0, 1))
-    out = _coat(out, np.array([0.015, 0.012, 0.012]), 0.9 * worn[2] * lids)
-    return out * (1 - worn[3] * area["cheeks"][:, None] * np.array([0.05, 0.28, 0.22])).astype(np.float32)
-
-
 def _coat(below: np.ndarray, colour: np.ndarray, cover: np.ndarray) -> np.ndarray:
-    """A thin coat of `colour` [3] over `below` [N, 3]: what lies below shines through, so pores and creases stay."""
-    relief = np.clip(
-        below.mean(-1, keepdims=True) / max(float(np.average(below.mean(-1), weights=cover + 1e-6)), 1e-4), 0.5, 1.5
-    )
+    """Cover `below` [N, 3] with a thin coat of `colour` [3], through which pores and creases show."""
+    middle = max(float(np.average(below.mean(-1), weights=cover + 1e-6)), 1e-4)
+    relief = np.clip(below.mean(-1, keepdims=True) / middle, 0.5, 1.5)
     return (below * (1 - cover[:, None]) + colour * relief * cover[:, None]).astype(np.float32)

@@ -12,12 +12,14 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def without_numpy_1() -> Iterator[None]:
-    """While Blender's module is imported: keeps back NumPy 2's pages on its audio module, which is made for NumPy 1 in
-    every module for Python 3.11, and not used here. Anything else that is said comes out."""
-    said = io.StringIO()
+    """Suppress NumPy 2's complaint while Blender's module is imported; all other messages come out.
+
+    It is about Blender's audio module, which is made for NumPy 1 for Python 3.11, and is not used here.
+    """
+    messages = io.StringIO()
     try:
-        with contextlib.redirect_stderr(said):
+        with contextlib.redirect_stderr(messages):
             yield
     finally:
-        if "compiled using NumPy 1.x" not in said.getvalue():
-            sys.stderr.write(said.getvalue())
+        if "compiled using NumPy 1.x" not in messages.getvalue():
+            sys.stderr.write(messages.getvalue())

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair as the texture shows it: brows of single strokes, the stubble of a beard and its blue shadow, a cropped
-scalp."""
+"""Hair in the texture: brows of single strokes, stubble with its blue shadow, a cropped scalp."""
 
 from __future__ import annotations
 
@@ -14,19 +13,9 @@ from .spots import strew
 
 
 def grow_brows(on: Canvas, ground: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
-    """How much of each texel brow hair covers.
+    """Draw brow hair; return its cover [N] in [0, 1] on `on`.
 
-    Parameters
-    ----------
-    on : what is painted on
-    ground : of the same head, where hairs root
-    region : [M] in [0, 1] on the ground, where brows grow
-    density : 1 is a usual brow
-    rng : of single hairs
-
-    Returns
-    -------
-    [N] in [0, 1], on `on`.
+    Hairs root on `ground`, of the same head, within region [M] in [0, 1]; density 1 is usual.
     """
     # a sparse brow is a narrow one
     roots, texel = strew(ground, 1.2 * density * np.clip(region * 2.2 - 1.3 + 0.8 * min(density, 1.2), 0, 1), rng)
@@ -41,20 +30,10 @@ def grow_brows(on: Canvas, ground: Canvas, region: np.ndarray, density: float, r
 def grow_stubble(
     on: Canvas, ground: Canvas, region: np.ndarray, density: float, length: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """How much of each texel beard hair covers.
+    """Draw beard hair; return its cover [N] in [0, 1] on `on`.
 
-    Parameters
-    ----------
-    on : what is painted on
-    ground : of the same head, where hairs root
-    region : [M] in [0, 1] on the ground, where a beard grows
-    density : hairs per mm^2 in the full of the region
-    length : in mm; 0.3 is shaven yesterday
-    rng : of single hairs
-
-    Returns
-    -------
-    [N] in [0, 1], on `on`.
+    Hairs root on `ground` within region [M] in [0, 1]; density in hairs per mm^2; length in mm, 0.3 a day after
+    shaving.
     """
     roots, texel = strew(ground, density * np.clip(region * 1.3 - 0.15, 0, 1) ** 1.5, rng)
     aside = np.sign(roots[:, 0:1]) * 0.25 + rng.normal(0, 0.35, (len(roots), 1))
@@ -63,24 +42,14 @@ def grow_stubble(
 
 
 def beard_shadow(albedo: np.ndarray, amount: np.ndarray) -> np.ndarray:
-    """albedo [N, 3] over hair below the surface, amount [N] in [0, 1]: red light reaches deeper and loses more, so the
-    shade is bluish grey."""
+    """Shade albedo [N, 3] by hair below the surface, amount [N] in [0, 1]; red reaches deeper and loses more."""
     return albedo * (1 - amount[:, None] * np.array([0.42, 0.30, 0.22], np.float32))
 
 
 def grow_cropped_hair(on: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
-    """How much of each texel very short hair of the scalp covers.
+    """Draw very short scalp hair; return its cover [N] in [0, 1].
 
-    Parameters
-    ----------
-    on : what is painted on
-    region : [N] in [0, 1] on it, the scalp
-    density : mean cover in [0, 1] in the full of the region
-    rng : of the grain
-
-    Returns
-    -------
-    [N] in [0, 1].
+    region [N] in [0, 1]; density: mean cover in the full of the region.
     """
     cover, there = np.zeros_like(region), region > 0.01
     grain = octaves(on.position[there], [0.6, 1.1], rng)
@@ -90,7 +59,7 @@ def grow_cropped_hair(on: Canvas, region: np.ndarray, density: float, rng: np.ra
 
 
 def _along(normal: np.ndarray, way: list[float]) -> np.ndarray:
-    """The unit direction nearest to `way` [3] in the plane across each normal [M, 3]."""
+    """Return the unit direction nearest to `way` [3] in the plane across each normal [M, 3]."""
     flat = np.asarray(way) - (normal @ np.asarray(way))[:, None] * normal
     return flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-3)
 
@@ -104,8 +73,11 @@ def _strokes(
     bend: np.ndarray,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Cover [N] of hairs `width` mm thick and `length` [M] mm long from roots [M, 3] along direction [M, 3], sinking by
-    `bend` (a share of the length)."""
+    """Return the cover [N] of straight hairs laid onto the surface.
+
+    They are `width` mm thick, length [M] mm long, run from roots [M, 3] along direction [M, 3] and sink by `bend` (a
+    share of the length).
+    """
     cover = np.zeros(len(on.position), np.float32)
     if not len(roots):
         return cover
@@ -118,9 +90,9 @@ def _strokes(
     points = roots[hair] + direction[hair] * (along * length[hair])[:, None]
     points[:, 2] += bend[hair] * along**2 * length[hair]
     _, nearest = on.tree.query(points, distance_upper_bound=8.0)  # lays the straight hair onto the surface
-    kept = nearest < len(cover)
-    hair, along, lifted = hair[kept], along[kept], points[kept] - on.position[nearest[kept]]
-    on_surface = on.position[nearest[kept]] + np.clip(lifted, -finest, finest)
+    near = nearest < len(cover)
+    hair, along, lifted = hair[near], along[near], points[near] - on.position[nearest[near]]
+    on_surface = on.position[nearest[near]] + np.clip(lifted, -finest, finest)
     radius = max(width, finest)
     texel, point, distance = on.near(on_surface, np.full(len(on_surface), 1.5 * radius))
     taper = (1 - 0.7 * along[point] ** 2) * rng.uniform(0.6, 1.0, len(roots))[hair[point]]
@@ -128,7 +100,7 @@ def _strokes(
     share = np.clip(1 - distance / (1.5 * radius), 0, 1) * taper * min(1.0, 2 * width / radius)
     order = np.lexsort((-share, texel, hair[point]))
     key = hair[point][order].astype(np.int64) * len(cover) + texel[order]
-    first = np.concatenate([[True], key[1:] != key[:-1]]) if len(key) else np.zeros(0, bool)
-    left = np.zeros(len(cover), np.float64)
-    np.add.at(left, texel[order][first], np.log1p(-np.minimum(share[order][first], 0.95)))
-    return (1 - np.exp(left)).astype(np.float32)
+    strongest = order[np.diff(key, prepend=-1) != 0]
+    log_bare = np.zeros(len(cover), np.float64)
+    np.add.at(log_bare, texel[strongest], np.log1p(-np.minimum(share[strongest], 0.95)))
+    return (1 - np.exp(log_bare)).astype(np.float32)

@@ -13,25 +13,24 @@ import numpy as np
 from core.face import template
 from core.geometry.meshes import Mesh
 
+RESERVED = json.loads((Path(__file__).parent / "reserved.json").read_text(encoding="utf-8"))
 STRENGTH = 0.75  # of N(0, 1): the tails of MakeHuman's combinations are caricatures
 
 
 def subject_mesh(seed: int) -> Mesh:
-    """The head of a subject in the template's topology and pose: metres, +Z up, face towards -Y."""
+    """Return a subject's head in the template's topology and pose: metres, +Z up, face towards -Y."""
     return template.load().moved(
         template.load().vertices + np.tensordot(identity_coefficients(seed), template.identity(), 1)
     )
 
 
 def identity_coefficients(seed: int) -> np.ndarray:
-    """[K], normal with deviation STRENGTH, cut at two deviations."""
+    """Draw coefficients [K], normal with deviation STRENGTH, cut at two deviations."""
     normal = np.random.default_rng([seed, 8]).normal(size=len(template.identity()))
     return STRENGTH * np.clip(normal, -2, 2)
 
 
 @cache
 def reserved_seeds() -> frozenset[int]:
-    """Seeds of subjects that are kept for measuring: nothing is trained on their identity, tone, moles or pores, now or
-    later."""
-    record = json.loads((Path(__file__).parent / "reserved.json").read_text(encoding="utf-8"))
-    return frozenset(record["seeds"]).union(*(range(first, last + 1) for first, last in record["blocks"]))
+    """Return the seeds kept for measuring: no training may take their identity, tone, moles or pores."""
+    return frozenset(RESERVED["seeds"]).union(*(range(first, last + 1) for first, last in RESERVED["blocks"]))

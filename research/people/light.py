@@ -1,22 +1,22 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light baked into the template's UV space with known truth: a smooth sky with its ambient occlusion, and a sun whose
-hard or soft shadows the head itself, leaves, blinds or a roof's edge cast.
+"""Light baked into the template's UV space with known truth.
 
-The sky is precomputed radiance transfer in second-order spherical harmonics (Sloan, Kautz and Snyder 2002); 1 is a
-white surface's light.
+A smooth sky with its ambient occlusion, and a sun whose hard or soft shadows the head itself, leaves, blinds or a
+roof's edge cast. The sky is precomputed radiance transfer in second-order spherical harmonics (Sloan, Kautz and Snyder
+2002); 1 is a white surface's light.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 
 from core.face import template
 from core.geometry import raster
-from core.geometry.meshes import Mesh, vertex_normals
+from core.geometry.meshes import Mesh, unit, vertex_normals
 from core.geometry.noise import noise
 from core.light.skylight import radiance_transfer
 from core.light.spherical_harmonics import LAMBERT, UNIFORM, per_function, sh_basis
@@ -27,8 +27,11 @@ SUN_RAYS = 20  # of each point, over the sun's disc
 
 @dataclass(frozen=True)
 class SkyAndSun:
-    """sky [9, 3]: coefficients of its radiance; sun [3]: unit direction to it; colour [3]: the shading of a surface
-    that faces it, zeros for no sun; radius: of the sun, in radians."""
+    """A sky and a sun.
+
+    sky [9, 3]: coefficients of its radiance; sun [3]: unit direction to it; colour [3]: shading of a surface that faces
+    it, zeros for no sun; radius of the sun in radians.
+    """
 
     sky: np.ndarray
     sun: np.ndarray
@@ -37,7 +40,7 @@ class SkyAndSun:
 
 
 def random_light(rng: np.random.Generator) -> SkyAndSun:
-    """Broad lights from anywhere but below, and a sun before the face."""
+    """Draw broad lights from anywhere but below, and a sun before the face."""
     sky = np.zeros((9, 3))
     for _ in range(4):  # broad lights from anywhere but below
         towards = rng.normal(size=3) * [1, 1, 0.6] + [0, -0.3, 0.5]
@@ -54,32 +57,22 @@ def random_light(rng: np.random.Generator) -> SkyAndSun:
 def bake(
     mesh: Mesh, size: int, light: SkyAndSun, shadows: str, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What a light makes of a mesh, in its UVs, bled beyond the charts.
+    """Bake a light into a mesh's UVs, bled beyond the charts.
 
-    Parameters
-    ----------
-    mesh : in metres
-    size : S, texels along a side
-    light : sky and sun
-    shadows : what throws them: none, self (the mesh alone), leaves, blinds or edge
-    rng : of what stands before the sun, and of the rays to it
-
-    Returns
-    -------
-    Shading [S, S, 3], the blocked share [S, S] of the sun where the surface faces it, and world normals [S, S, 3].
+    shadows: their cause, one of none, self (the mesh alone), leaves, blinds, edge. Returns shading [S, S, 3], the
+    blocked share [S, S] of the sun where the surface faces it, and world normals [S, S, 3].
     """
     face, bary = raster.rasterize_uv(mesh, size)
     covered = face >= 0
     face, bary = face[covered], bary[covered]
     points = raster.interpolate(mesh.vertices, mesh.faces, face, bary)
-    normals = raster.interpolate(vertex_normals(mesh), mesh.faces, face, bary)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    normals = unit(raster.interpolate(vertex_normals(mesh), mesh.faces, face, bary))
     caster = raster.RayCaster(mesh)
     ambient = raster.interpolate(_transfer_of(mesh, caster) @ light.sky, mesh.faces, face, bary)
-    seen = _sun_seen(caster, points, normals, light, shadows, rng)
+    free = _sun_seen(caster, points, normals, light, shadows, rng)
     cosine = np.maximum(normals @ light.sun, 0)
-    shading = np.maximum(ambient, 0.005) + (cosine * seen)[:, None] * light.colour
-    shadow = np.where(cosine > 0.02, 1 - seen, 0) * (light.colour.sum() > 0)
+    shading = np.maximum(ambient, 0.005) + (cosine * free)[:, None] * light.colour
+    shadow = np.where(cosine > 0.02, 1 - free, 0) * (light.colour.sum() > 0)
 
     def spread(texel_values: np.ndarray) -> np.ndarray:
         picture = np.zeros((size, size, *texel_values.shape[1:]), np.float32)
@@ -87,25 +80,6 @@ def bake(
         return raster.bleed(picture, covered)
 
     return spread(shading), spread(shadow), spread(normals)
-
-
-def trace_transfer(
-    points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster, rays: int = TRANSFER_RAYS
-) -> np.ndarray:
-    """Shading of points per coefficient of the sky's radiance, blocked where the mesh is in the way.
-
-    Parameters
-    ----------
-    points : [N, 3] on it, in metres
-    normals : [N, 3], unit
-    caster : of the mesh
-    rays : of each point
-
-    Returns
-    -------
-    [N, 9]; an open surface under radiance 1 gets 1.
-    """
-    return radiance_transfer(caster, points, normals, rays)
 
 
 def _sun_seen(
@@ -116,46 +90,36 @@ def _sun_seen(
     shadows: str,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """The share [N] of the sun's disc that each point sees past the head and past whatever else throws a shadow."""
+    """Return the share [N] of the sun's disc that each point sees past the head and past what else casts a shadow."""
+    if shadows == "none":
+        return np.ones(len(points))
     sun, radius = light.sun, light.radius
     right = np.cross(sun, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     up = np.cross(right, sun)
     turn, reach = rng.uniform(0, 2 * np.pi), np.sqrt((np.arange(SUN_RAYS) + 0.5) / SUN_RAYS) * radius
     spiral = np.pi * (1 + 5**0.5) * np.arange(SUN_RAYS) + turn
-    directions = sun + (reach * np.cos(spiral))[:, None] * right + (reach * np.sin(spiral))[:, None] * up
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    seen = np.zeros((SUN_RAYS, len(points)), np.float32)
-    if shadows == "none":
-        return np.ones(len(points))
+    directions = unit(sun + (reach * np.cos(spiral))[:, None] * right + (reach * np.sin(spiral))[:, None] * up)
+    free = np.zeros((SUN_RAYS, len(points)), np.float32)
     facing = np.flatnonzero(normals @ sun > 0)
     for ray, direction in enumerate(directions):
-        seen[ray, facing] = ~caster.blocked(
+        free[ray, facing] = ~caster.blocked(
             points[facing] + 1e-3 * normals[facing], np.repeat(direction[None], len(facing), 0)
         )
     if shadows != "self":
         away = rng.uniform(0.25, 1.0)  # metres to what throws the shadow
         at = points[None, facing] + away * directions[:, None]
-        seen[:, facing] *= 1 - draw_sheet(at @ right, at @ up, away * radius * 2 / SUN_RAYS**0.5, shadows, rng)
+        free[:, facing] *= 1 - draw_sheet(at @ right, at @ up, away * radius * 2 / SUN_RAYS**0.5, shadows, rng)
     share = np.zeros(len(points))
-    share[facing] = seen[:, facing].mean(0)
+    share[facing] = free[:, facing].mean(0)
     return share
 
 
 def draw_sheet(x: np.ndarray, y: np.ndarray, blur: float, kind: str, rng: np.random.Generator) -> np.ndarray:
-    """How far an opaque sheet with holes, drawn at random, covers places in a plane across the sunlight.
+    """Return the cover [...] in [0, 1] of an opaque sheet with random holes across the sunlight, at places x, y [...].
 
-    Parameters
-    ----------
-    x, y : [...], the places, in metres
-    blur : width of the sheet's edges, in metres; where rays are cast, the distance between two of them there, so that
-        few make an even penumbra
-    kind : edge or blinds; leaves otherwise
-    rng : of the sheet
-
-    Returns
-    -------
-    [...] in [0, 1]; 1 where it is opaque.
+    x, y and blur, the width of the sheet's edges, are in metres; where rays are cast, blur is the distance between two
+    of them there, so that few make an even penumbra. kind: edge or blinds; leaves otherwise.
     """
     turn, shift = rng.uniform(0, np.pi), rng.uniform(-0.05, 0.05)
     along = (x - x.mean()) * np.cos(turn) + (y - y.mean()) * np.sin(turn) + shift
@@ -173,16 +137,16 @@ def draw_sheet(x: np.ndarray, y: np.ndarray, blur: float, kind: str, rng: np.ran
     return np.clip(0.5 + inside / max(blur, 1e-4), 0, 1)
 
 
-@lru_cache(maxsize=2)
+@cache
 def sky_transfer() -> np.ndarray:
-    """`trace_transfer` of the built-in head's vertices [V, 9]; computed once per process."""
+    """Return the built-in head's transfer per vertex [V, 9]; computed once per process."""
     mesh = template.load()
-    return trace_transfer(mesh.vertices, vertex_normals(mesh), raster.RayCaster(mesh))
+    return radiance_transfer(raster.RayCaster(mesh), mesh.vertices, vertex_normals(mesh), TRANSFER_RAYS)
 
 
 def _transfer_of(mesh: Mesh, caster: raster.RayCaster) -> np.ndarray:
-    """Per vertex [V, 9]; the template's is computed once per process."""
+    """Return the transfer per vertex [V, 9]; the template's is computed once per process."""
     same = template.load()
     if mesh.vertices.shape == same.vertices.shape and np.array_equal(mesh.vertices, same.vertices):
         return sky_transfer()
-    return trace_transfer(mesh.vertices, vertex_normals(mesh), caster)
+    return radiance_transfer(caster, mesh.vertices, vertex_normals(mesh), TRANSFER_RAYS)

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A light stage around a synthetic head: which of some hundreds of lights each vertex sees, so that any environment is
-a matrix product.
+"""A light stage around a head: the lights that each vertex sees, so that any environment is a matrix product.
 
 One light at a time (Debevec et al. 2000): light is linear, so skin under an environment is the sum over the lights,
-weighted by its radiance. What is as hard as the sun falls between the lights; `trace_sun` casts its rays at every pixel
+weighted by its radiance. A light as hard as the sun falls between them; `trace_sun` casts its rays at every pixel
 instead.
 """
 
@@ -23,12 +22,14 @@ LIGHTS = 256
 LIFT = 1e-3  # metres off the surface from which a ray starts
 DIRECTIONS = fibonacci_sphere(LIGHTS)
 BASIS = sh_basis(DIRECTIONS)
-GLOSS = 16  # exponent of the lobe in which the environment shines back: the roughness of skin
 
 
 @dataclass(frozen=True)
 class LightStage:
-    """mesh; normals float32 [V, 3] unit; visible bool [V, LIGHTS]: whether light from DIRECTIONS reaches a vertex."""
+    """A head and its lights.
+
+    normals float32 [V, 3] unit; visible bool [V, LIGHTS]: True if light from DIRECTIONS reaches a vertex.
+    """
 
     mesh: Mesh
     normals: np.ndarray
@@ -36,7 +37,7 @@ class LightStage:
 
 
 def light_stage(mesh: Mesh) -> LightStage:
-    """Rays from every vertex of a mesh to every light before it."""
+    """Cast rays from every vertex of a mesh to every light before it."""
     caster, normals = RayCaster(mesh), vertex_normals(mesh)
     visible = np.zeros((len(normals), LIGHTS), bool)
     for i, direction in enumerate(DIRECTIONS):
@@ -49,26 +50,16 @@ def light_stage(mesh: Mesh) -> LightStage:
 
 
 def transport(stage: LightStage, vertices: np.ndarray) -> np.ndarray:
-    """float32 [N, LIGHTS]: what each light of radiance 1 adds to the shading of these vertices; a row of an open
-    surface adds up to 1."""
+    """Return the shading float32 [N, LIGHTS] of vertices per light of radiance 1; rows of an open surface sum to 1."""
     cosine = stage.normals[vertices] @ DIRECTIONS.T.astype(np.float32)
     return np.maximum(cosine, 0) * stage.visible[vertices] * np.float32(4 / LIGHTS)
 
 
 def mirror_environment(stage: LightStage, vertices: np.ndarray, environment: np.ndarray, eye: np.ndarray) -> np.ndarray:
-    """What glossy skin shows of an environment, blocked by the head: a lobe of exponent GLOSS about the mirrored view.
-    Times Fresnel's reflectance it adds to the diffuse colour.
+    """Return the environment's reflection in glossy skin, blocked by the head: linear radiance float32 [N, 3].
 
-    Parameters
-    ----------
-    stage : the head
-    vertices : int [N], of its mesh
-    environment : [LIGHTS, 3], linear radiance from DIRECTIONS
-    eye : [3], where the camera is, in metres
-
-    Returns
-    -------
-    float32 [N, 3], linear radiance.
+    A lobe of exponent 16, the roughness of skin, about the mirrored view; times Fresnel's reflectance it adds to the
+    diffuse colour. environment [LIGHTS, 3]: linear radiance from DIRECTIONS; eye [3]: the camera, in metres.
     """
     normals = stage.normals[vertices]
     towards = (eye - stage.mesh.vertices[vertices]).astype(np.float32)
@@ -90,33 +81,21 @@ def trace_sun(
     rays: int,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """The share of a disc of light that points see past the head: a denser cone of rays, turned at random per point, so
-    that few rays give an even penumbra.
+    """Return the share float32 [N] in [0, 1] of a disc of light that points see past the head.
 
-    Parameters
-    ----------
-    caster : of the head
-    points : [N, 3], in metres
-    normals : [N, 3], unit
-    sun : [3], unit direction to the disc's middle
-    radius : of the disc, in radians
-    rays : of each point
-    rng : turns the cones
-
-    Returns
-    -------
-    float32 [N] in [0, 1]; 0 where the surface turns away.
+    A cone of rays turned at random per point, so that few rays give an even penumbra; 0 where the surface turns away.
+    points [N, 3] in metres; normals [N, 3] unit; sun [3]: unit direction to the disc's middle; radius in radians.
     """
     right = np.cross(sun, [0.0, 0.0, 1.0] if abs(sun[2]) < 0.9 else [1.0, 0.0, 0.0])
     right /= np.linalg.norm(right)
     up = np.cross(right, sun)
     facing = np.flatnonzero(normals @ sun > -0.1)
     origins, turn = points[facing] + LIFT * normals[facing], rng.uniform(0, 2 * np.pi, len(facing))
-    seen = np.zeros(len(facing), np.float32)
+    free = np.zeros(len(facing), np.float32)
     for ray in range(rays):
         reach, angle = radius * np.sqrt((ray + 0.5) / rays), turn + ray * np.pi * (1 + 5**0.5)
         directions = sun + reach * (np.cos(angle)[:, None] * right + np.sin(angle)[:, None] * up)
-        seen += ~caster.blocked(origins, directions / np.linalg.norm(directions, axis=1, keepdims=True))
+        free += ~caster.blocked(origins, directions / np.linalg.norm(directions, axis=1, keepdims=True))
     share = np.zeros(len(points), np.float32)
-    share[facing] = seen / rays
+    share[facing] = free / rays
     return share

@@ -1,23 +1,21 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A synthetic person before a busy wall, photographed by known cameras without a renderer: what cameras, motion and
-import are tested on.
+"""A person before a busy wall, photographed by known cameras without a renderer, for tests of cameras.
 
 World: metres, +Z up, the face towards -Y. Azimuth 0 is in front, positive on the person's left.
 """
 
+from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import cv2
 import numpy as np
-import pycolmap
 
-from core.face import template
 from core.geometry import meshes, raster
 from core.geometry.views import View
 from core.imaging import images
 
+from .cameras import pinhole_view
 from .identities import subject_mesh
 from .parameters import sample_parameters
 from .skin import make_skin
@@ -29,44 +27,18 @@ SEED = 5
 
 @cache
 def person(seed: int = SEED, texels: int = 256) -> tuple[raster.RayCaster, np.ndarray, np.ndarray]:
-    """The head's mesh, ready for rays, its vertex normals, and its diffuse albedo, linear [texels, texels, 3]."""
+    """Return the head's ray caster, its vertex normals, and its linear diffuse albedo [texels, texels, 3]."""
     mesh = subject_mesh(seed)
     return raster.RayCaster(mesh), meshes.vertex_normals(mesh), make_skin(sample_parameters(seed), texels).diffuse
-
-
-@cache
-def jaw_drop() -> tuple[np.ndarray, np.ndarray]:
-    """The vertices of the head that an opening jaw moves, and how far, [N] and [N, 3] in metres; the lips, which are
-    one here, stretch."""
-    with np.load(template.ASSETS / "face_units.npz", allow_pickle=False) as stored:
-        rows, moves = np.cumsum(stored["rows_jawOpen"].astype(int)), stored["moves_jawOpen"].T * float(stored["step"])
-        mirrored, count = stored["mirror"].astype(int)[rows], int(stored["head_vertices"])
-    other = mirrored != rows  # one half is stored, and what lies in the middle
-    rows, moves = np.concatenate([rows, mirrored[other]]), np.concatenate([moves, moves[other] * [-1, 1, 1]])
-    return rows[rows < count], moves[rows < count]
-
-
-def speaking(seed: int, jaw: float) -> tuple[raster.RayCaster, np.ndarray]:
-    """The head of a seed with its jaw open by that share of how far it goes: for rays, and its vertex normals."""
-    mesh, (rows, moves) = subject_mesh(seed), jaw_drop()
-    vertices = mesh.vertices.copy()
-    vertices[rows] += jaw * moves
-    mesh = mesh.moved(vertices)
-    return raster.RayCaster(mesh), meshes.vertex_normals(mesh)
 
 
 def place_camera(
     azimuth_deg: float, height: float = 0.0, distance: float = 0.55, target=(0, -0.01, -0.035), scale: float = 1.0
 ) -> View:
-    """A camera that looks at the head, which it shows alike large from any distance.
+    """Return a camera that looks at the head, which it shows equally large from any distance.
 
-    Parameters
-    ----------
-    azimuth_deg : where it stands; 0 is in front, positive on the person's left
-    height : above the eyes, in metres
-    distance : from the head's axis, in metres; the focal length goes with it
-    target : [3], what it looks at, in metres
-    scale : of the picture's size, WIDTH x HEIGHT at 1
+    height in metres above the eyes; distance in metres from the head's axis; target [3] in metres; scale of WIDTH x
+    HEIGHT.
     """
     a = np.radians(azimuth_deg)
     centre, target = np.array([np.sin(a) * distance, -np.cos(a) * distance, height]), np.array(target)
@@ -74,19 +46,13 @@ def place_camera(
     x = np.cross(z, [0, 0, 1])
     x /= np.linalg.norm(x)
     rotation = np.stack([x, np.cross(z, x), z])
-    pinhole = pycolmap.Camera(
-        camera_id=1,
-        model="PINHOLE",
-        width=round(WIDTH * scale),
-        height=round(HEIGHT * scale),
-        params=np.array([FOCAL * distance / 0.55, FOCAL * distance / 0.55, WIDTH / 2, HEIGHT / 2]) * scale,
-    )
-    return View("", Path(), pinhole, rotation, -rotation @ centre, True)
+    size = round(WIDTH * scale), round(HEIGHT * scale)
+    middle = np.array([WIDTH / 2, HEIGHT / 2]) * scale
+    return pinhole_view(size, FOCAL * distance / 0.55 * scale, middle, rotation, -rotation @ centre)
 
 
 def studio(scale: float = 1.0) -> list[View]:
-    """Sixteen fixed cameras a metre away in two rows, over 100 degrees from side to side: the layout of multi-view
-    studios as NeRSemble's."""
+    """Return sixteen cameras a metre away in two rows over 100 degrees, as in multi-view studios (NeRSemble)."""
     return [
         place_camera(azimuth, height, 1.0, scale=scale)
         for height in (-0.15, 0.25)
@@ -101,40 +67,25 @@ def photograph(
     even: bool = False,
     seed: int = SEED,
     texels: int = 256,
-    jaw: float = 0.0,
 ) -> np.ndarray:
-    """The person before a wall.
+    """Photograph the person before a wall, or before grey; sRGB [H, W, 3].
 
-    Parameters
-    ----------
-    view : the camera
-    turned_deg : how far the head is turned to the person's left; light and wall stay
-    wall : off, the background is plain grey
-    even : light from everywhere
-    seed : the person
-    texels : along a side of its albedo
-    jaw : how far it is open, in [0, 1]
-
-    Returns
-    -------
-    sRGB [H, W, 3].
+    The head is turned by `turned_deg` to the person's left while light and wall stay; even: light from everywhere;
+    texels: side of the albedo.
     """
     caster, normals, albedo = person(seed, texels)
-    if jaw:
-        caster, normals = speaking(seed, jaw)
     turn = np.radians(turned_deg)
     rotation = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
-    # the camera as the head sees it
-    seen = View(view.name, view.path, view.camera, view.rotation @ rotation, view.translation, True)
-    face, bary, _ = raster.render_view(caster, seen, 2)
+    # the camera in the head's axes
+    face, bary, _ = raster.render_view(caster, replace(view, rotation=view.rotation @ rotation), 2)
     hit = face >= 0  # what lies beside the head need not be worked out
     face, bary = face[hit], bary[hit]
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
     colour = raster.sample_uv(albedo, uv)
     normal = raster.interpolate(normals, caster.mesh.faces, face, bary) @ rotation.T
-    shade = (
-        np.full(len(face), 0.9) if even else 0.55 + 0.45 * np.clip(normal @ (np.array([0.3, -0.8, 0.5]) / 0.99), 0, 1)
-    )
+    shade = np.full(len(face), 0.9)
+    if not even:
+        shade = 0.55 + 0.45 * np.clip(normal @ (np.array([0.3, -0.8, 0.5]) / 0.99), 0, 1)
     lit = np.zeros((*hit.shape, 3), np.float32)
     lit[hit] = colour * (shade * 1.6)[:, None]
     head = images.resize(lit, view.width, view.height)
@@ -150,17 +101,12 @@ def _paper() -> np.ndarray:
 
 
 def _wall(view: View) -> np.ndarray:
-    """The wall behind the person, in the plane y = WALL_AT, linear [H, W, 3]."""
+    """Return the wall behind the person, in the plane y = WALL_AT, linear [H, W, 3]."""
     x, y = np.meshgrid(np.arange(view.width) + 0.5, np.arange(view.height) + 0.5)
     rays = view.rays(np.stack([x, y], -1).reshape(-1, 2))
     with np.errstate(divide="ignore"):
         reach = (WALL_AT - view.centre[1]) / rays[:, 1]
     hit = view.centre + rays * np.where(reach > 0, reach, 0)[:, None]
     at = ((hit[:, [0, 2]] / WALL_M + 0.5) % 1 * 1200).astype(np.float32)
-    return cv2.remap(
-        _paper(),
-        at[:, :1].reshape(y.shape),
-        at[:, 1:].reshape(y.shape),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REFLECT,
-    )
+    column, row = (at[:, k].reshape(y.shape) for k in range(2))
+    return cv2.remap(_paper(), column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)

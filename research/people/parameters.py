@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The parameters of one subject's skin and their distribution: all tones, ages and sexes, by one seed."""
+"""The parameters of a subject's skin and their distribution over all tones, ages and sexes, by one seed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from . import pigment
 
 @dataclass(frozen=True)
 class SkinParameters:
-    """One subject. The four seeds are independent: another mole_seed moves moles and freckles and nothing else."""
+    """One subject. The seeds are independent: another mole_seed moves moles and freckles and nothing else."""
 
     melanin: float = 0.05  # volume fraction in the epidermis, 0.005 very light ... 0.6 very dark
     blood: float = 0.015  # volume fraction in the dermis
@@ -50,8 +50,7 @@ class SkinParameters:
 
 
 def sample_parameters(seed: int) -> SkinParameters:
-    """A subject at random: the typology angle of the tone is uniform from -55 (dark) to 62 degrees (very light), half
-    of the subjects are men."""
+    """Draw a subject: half of them men, their typology angles uniform from -55 (dark) to 62 degrees (very light)."""
     rng = np.random.default_rng([seed, 0])
     angle, blood = rng.uniform(-55, 62), float(np.exp(rng.uniform(np.log(0.009), np.log(0.04))))
     oxygen, scattering = float(rng.uniform(0.6, 0.9)), float(rng.uniform(0.7, 1.8))
@@ -97,8 +96,7 @@ def sample_parameters(seed: int) -> SkinParameters:
 
 
 def adorned(parameters: SkinParameters, seed: int) -> SkinParameters:
-    """The same subject with what only some people have: half of them scars, most women and few men make-up. What trains
-    a network takes these."""
+    """Add for training: scars on half of the subjects, make-up on most women and few men."""
     rng = np.random.default_rng([seed, 9])
     painted = rng.random() < (0.05 if parameters.beard > 0 else 0.6)
     make_up = float(rng.uniform(0.15, 1.0)) if painted else 0.0
@@ -112,14 +110,14 @@ def adorned(parameters: SkinParameters, seed: int) -> SkinParameters:
 
 
 def _melanin_of_angle(angle: float, blood: float, oxygen: float, scattering: float, slope: float) -> float:
-    """The melanin that gives skin of this blood the typology angle, within the model's range."""
+    """Return the melanin that gives skin of this blood the typology angle, within the model's range."""
     melanin = np.geomspace(0.004, 0.6, 400)
     angles = pigment.typology_angle(pigment.reflectance(melanin, np.full(400, blood), oxygen, scattering, slope))
     return float(np.interp(-angle, -angles, melanin))  # the angle falls with melanin
 
 
 def _hair_colour(lightness: float, rng: np.random.Generator) -> np.ndarray:
-    """Albedo [3] from black through brown to blond, or red, where the skin is light."""
+    """Draw an albedo [3] from black through brown to blond, or red, where the skin is light."""
     fair = rng.random() ** 1.5 * lightness
     dark, blond, red = np.array([0.016, 0.011, 0.009]), np.array([0.30, 0.19, 0.095]), np.array([0.16, 0.05, 0.018])
     light = red if rng.random() < 0.12 else blond

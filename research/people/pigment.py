@@ -16,6 +16,8 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
+from core.geometry import raster
+
 # volume fraction of melanosomes in the epidermis; Jacques: 0.013 ... 0.43 from very light to very dark skin
 MELANIN_RANGE = 0.002, 0.9
 BLOOD_RANGE = 0.001, 0.3  # volume fraction of blood in the dermis; normal skin 0.002 ... 0.07, lips and flush more
@@ -28,114 +30,20 @@ BASELINE = 0.25  # on the absorption of skin without pigment
 BACKSCATTER = 0.012  # share of the light that returns from above the melanin
 
 WAVELENGTHS = np.arange(400, 701, 10, dtype=np.float64)  # nm
-D65 = np.array(
-    [
-        82.75,
-        91.49,
-        93.43,
-        86.68,
-        104.86,
-        117.01,
-        117.81,
-        114.86,
-        115.92,
-        108.81,
-        109.35,
-        107.80,
-        104.79,
-        107.69,
-        104.41,
-        104.05,
-        100.00,
-        96.33,
-        95.79,
-        88.69,
-        90.01,
-        89.60,
-        87.70,
-        83.29,
-        83.70,
-        80.03,
-        80.21,
-        82.28,
-        78.28,
-        69.72,
-        71.61,
-    ]
-)
-OXYGENATED = np.array(
-    [
-        266232,
-        466840,
-        480360,
-        246072,
-        102580,
-        62816,
-        44480,
-        33209,
-        26629,
-        23684,
-        20933,
-        20035,
-        24202,
-        39957,
-        53236,
-        43016,
-        # 1/(cm M)
-        32613,
-        44496,
-        50104,
-        14401,
-        3200,
-        1506,
-        942,
-        610,
-        442,
-        368,
-        320,
-        294,
-        278,
-        276,
-        290,
-    ],
-    np.float64,
-)
-DEOXYGENATED = np.array(
-    [
-        223296,
-        303956,
-        407560,
-        528600,
-        413280,
-        103292,
-        23389,
-        16156,
-        14550,
-        16684,
-        20862,
-        25774,
-        31590,
-        39036,
-        46592,
-        53412,
-        53788,
-        45072,
-        37020,
-        28324,
-        14677,
-        9444,
-        6510,
-        5149,
-        4345,
-        3750,
-        3227,
-        2795,
-        2408,
-        2052,
-        1794,
-    ],
-    np.float64,
-)
+# fmt: off
+D65 = np.array([
+    82.75, 91.49, 93.43, 86.68, 104.86, 117.01, 117.81, 114.86, 115.92, 108.81, 109.35, 107.80, 104.79, 107.69, 104.41,
+    104.05, 100.00, 96.33, 95.79, 88.69, 90.01, 89.60, 87.70, 83.29, 83.70, 80.03, 80.21, 82.28, 78.28, 69.72, 71.61,
+])
+OXYGENATED = np.array([  # 1/(cm M)
+    266232, 466840, 480360, 246072, 102580, 62816, 44480, 33209, 26629, 23684, 20933, 20035, 24202, 39957, 53236, 43016,
+    32613, 44496, 50104, 14401, 3200, 1506, 942, 610, 442, 368, 320, 294, 278, 276, 290,
+], np.float64)
+DEOXYGENATED = np.array([
+    223296, 303956, 407560, 528600, 413280, 103292, 23389, 16156, 14550, 16684, 20862, 25774, 31590, 39036, 46592,
+    53412, 53788, 45072, 37020, 28324, 14677, 9444, 6510, 5149, 4345, 3750, 3227, 2795, 2408, 2052, 1794,
+], np.float64)
+# fmt: on
 # linear, D65 (IEC 61966-2-1)
 XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB (IEC 61966-2-1)
@@ -150,40 +58,24 @@ def reflectance(
     slope: float = 2.4,
     chroma: float = 1.0,
 ) -> np.ndarray:
-    """Diffuse albedo of melanin and blood, both clipped to the model's range.
+    """Return the diffuse albedo, linear sRGB float32 [..., 3]; melanin and blood are clipped to the model's range.
 
-    Parameters
-    ----------
-    melanin : [...], volume fraction in the epidermis
-    blood : [...], volume fraction in the dermis
-    oxygen : saturated share of the blood
-    scattering : factor on the dermis's scattering; denser collagen is lighter
-    slope : exponent by which melanin absorbs more towards blue: 3.33 for melanosomes alone (yellower), less steep as
-        seen through skin
-    chroma : power on the channels' ratios to luminance; cameras and artists show skin more saturated than a
-        spectrometer does
-
-    Returns
-    -------
-    Linear sRGB, float32 [..., 3].
+    melanin [...]: volume fraction in the epidermis; blood [...]: in the dermis; oxygen: saturated share of the blood;
+    scattering: factor on the dermis's, denser collagen is lighter; slope: exponent of melanin's absorption towards
+    blue, 3.33 for melanosomes alone (yellower), less seen through skin; chroma: power on the channels' ratios to
+    luminance, as cameras show skin more saturated than a spectrometer does.
     """
     melanin, blood = np.asarray(melanin, np.float32), np.asarray(blood, np.float32)
-    x = _position(blood, BLOOD_RANGE).reshape(1, -1)
-    y = _position(melanin, MELANIN_RANGE).reshape(1, -1)
-    table = _table(
-        round(float(oxygen), 3), round(float(scattering), 3), round(float(slope), 3), round(float(chroma), 3)
-    )
-    step = 32000  # cv2.remap takes fewer than 32767 columns
-    parts = [
-        cv2.remap(table, x[:, i : i + step], y[:, i : i + step], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        for i in range(0, x.size, step)
-    ]
-    return np.concatenate(parts, 1).reshape(*melanin.shape, 3)
+    table = _table(*(round(float(parameter), 3) for parameter in (oxygen, scattering, slope, chroma)))
+    at = np.stack([_position(blood, BLOOD_RANGE).ravel(), _position(melanin, MELANIN_RANGE).ravel()], 1)
+    return raster.sample(table, at + np.float32(0.5)).reshape(*melanin.shape, 3)
 
 
 def typology_angle(linear: np.ndarray) -> np.ndarray:
-    """Individual typology angle in degrees of linear sRGB [..., 3]: above 55 very light, below -30 dark (Chardon et al.
-    1991)."""
+    """Return individual typology angles in degrees of linear sRGB [..., 3]: above 55 very light, below -30 dark.
+
+    Chardon et al. 1991.
+    """
     xyz = linear @ np.linalg.inv(XYZ_TO_SRGB).T / [0.9505, 1.0, 1.089]
     root = np.where(xyz > 216 / 24389, np.cbrt(xyz), (24389 / 27 * xyz + 16) / 116)
     return np.degrees(np.arctan2(116 * root[..., 1] - 66, 200 * (root[..., 1] - root[..., 2])))
@@ -196,7 +88,7 @@ def _position(fraction: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _table(oxygen: float, scattering: float, slope: float, chroma: float) -> np.ndarray:
-    """reflectance on a grid, uniform in the logarithms: linear sRGB float32 [TABLE melanin, TABLE blood, 3]."""
+    """Tabulate reflectance uniformly in the logarithms: linear sRGB float32 [TABLE melanin, TABLE blood, 3]."""
     nodes = 65  # smooth functions of two variables: computed coarsely, enlarged cubically
     melanin = np.geomspace(*MELANIN_RANGE, nodes)[:, None, None]
     blood = np.geomspace(*BLOOD_RANGE, nodes)[None, :, None]
@@ -209,7 +101,7 @@ def _table(oxygen: float, scattering: float, slope: float, chroma: float) -> np.
 
 
 def _spectrum(melanin: np.ndarray, blood: np.ndarray, oxygen: float, scattering: float, slope: float) -> np.ndarray:
-    """Diffuse reflectance [..., 31] per wavelength; absorption and scattering in 1/cm (Jacques 1998)."""
+    """Return diffuse reflectance [..., 31] per wavelength; absorption and scattering in 1/cm (Jacques 1998)."""
     baseline = BASELINE * (0.244 + 85.3 * np.exp(-(WAVELENGTHS - 154) / 66.2))
     epidermis = melanin * 333 * (WAVELENGTHS / 620) ** -slope + (1 - melanin) * baseline
     molar = 150 / 64500  # mol of haemoglobin in a litre of blood
@@ -226,7 +118,7 @@ def _spectrum(melanin: np.ndarray, blood: np.ndarray, oxygen: float, scattering:
 
 
 def _integrate(spectrum: np.ndarray) -> np.ndarray:
-    """Reflectance per wavelength [..., 31] under D65 -> linear sRGB [..., 3]; a white surface gives 1."""
+    """Integrate reflectance [..., 31] under D65 to linear sRGB [..., 3]; a white surface gives 1."""
 
     def lobe(centre: float, below: float, above: float) -> np.ndarray:
         return np.exp(-0.5 * ((WAVELENGTHS - centre) * np.where(WAVELENGTHS < centre, below, above)) ** 2)

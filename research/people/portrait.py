@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Portraits under any light, with their truth: a subject on the light stage, an environment, suns and lamps with what
-stands before them, a camera.
+"""Portraits of bald subjects with their truth: light stage, environment, lamps behind gobos, camera.
 
 `relight_sight` makes as many pictures of one sight as there are lights.
 """
@@ -15,49 +14,41 @@ import numpy as np
 
 from core.imaging import images
 
-from .environments import Environment, background_radiance, made_environment, panorama_environment
+from .environments import Environment, background_radiance, random_environment
 from .fitted_light import FittedLight, LampOnHead, fitted_light
 from .light import draw_sheet
 from .olat import BASIS, DIRECTIONS, LightStage, mirror_environment, transport
 from .response import curve, develop, expose
-from .sight import MASKS, Sight, landmarks_of, random_camera, trace_sight
+from .sight import Sight, landmarks_of, random_camera, trace_sight
 from .skin import Skin
 
 F0 = 0.08  # reflectance at normal incidence per Specular IOR Level of Blender's Principled BSDF
 GOBOS = ("none", "none", "none", "leaves", "leaves", "blinds", "edge")
+STRONGEST = 9.0  # of a lamp's irradiance over pi, beside an environment of mean radiance 1
 
 
 @dataclass(frozen=True)
 class Portrait:
-    """float32 pictures of side S. srgb [S, S, 3]: the file; albedo [S, S, 3]: linear, 0 off the head; shading [S, S,
-    3]: what the albedo was multiplied by, highlights and clipping included; even [S, S, 3]: the same for skin of one
-    tone and lips of one, so that nothing of the pigment is in it, through what the camera's curve does to pigment
-    either; shadow [S, S] in [0, 1]: the share of the main light that is blocked or turned away, 0 where no light is
-    main; strong: that light's irradiance facing it over all other light's, as a share in [0, 1]; head, face and skin
-    [S, S] in [0, 1]; fitted [P]."""
+    """A portrait and its truth, float32 pictures of side S.
+
+    srgb [S, S, 3]: the file; albedo [S, S, 3]: linear, 0 off the head; even [S, S, 3]: factor on an albedo of one tone
+    for skin and one for lips, highlights, clipping and camera curve included, so that nothing of the pigment is in it;
+    shadow [S, S] in [0, 1]: share of the lamps' light that is blocked or turned away, 0 without lamps; strong in [0,
+    1]: share of that light in all irradiance, facing it; head and skin [S, S] in [0, 1]; fitted [P].
+    """
 
     srgb: np.ndarray
     albedo: np.ndarray
-    shading: np.ndarray
     even: np.ndarray
     shadow: np.ndarray
     strong: float
     head: np.ndarray
-    face: np.ndarray
     skin: np.ndarray
     fitted: FittedLight
 
 
 def sample_sight(stage: LightStage, skin: Skin, rng: np.random.Generator, size: int) -> Sight:
-    """A subject through a random camera.
-
-    Parameters
-    ----------
-    stage : the head
-    skin : its maps
-    rng : of camera, eyes and lamps
-    size : pixels along a side
-    """
+    """Show a subject, with its skin's maps, to a random camera of `size` pixels a side."""
     camera = random_camera(landmarks_of(stage), size, rng)
     return trace_sight(stage, camera, skin.diffuse, F0 * skin.specular, skin.normal, rng, open_eyes=rng.random() < 0.7)
 
@@ -69,66 +60,64 @@ def relight_sight(
     panoramas: list[np.ndarray] = (),
     albedo: np.ndarray | None = None,
 ) -> Portrait:
-    """One picture of a sight under a random light.
+    """Photograph a sight under a random light.
 
-    Parameters
-    ----------
-    sight : what is seen
-    stage : of the same head
-    rng : of light, background, hair and camera
-    panoramas : as `read_panoramas` gives them; they may light it
-    albedo : [P, 3], linear, in place of the sight's
+    stage: of the same head; panoramas, from `read_panoramas`, may light it; albedo [P, 3], linear, in place of the
+    sight's.
     """
     albedo = sight.albedo if albedo is None else albedo
-    environment = (
-        panorama_environment(panoramas[rng.integers(len(panoramas))], rng)
-        if len(panoramas) and rng.random() < 0.6
-        else made_environment(rng)
-    )
-    carried = transport(stage, sight.vertices)
-    ambient, shine = _under(environment, sight, stage, carried)
-    lamps, colours, reaches = _lamps(environment, sight, rng)
+    environment = random_environment(panoramas, rng)
+    transfer = transport(stage, sight.vertices)
+    ambient, shine = _under(environment, sight, stage, transfer)
+    lamps, reaches = [], []
+    for k, colour, lost in draw_lamps(environment, sight.lamps, sight.radius, sight.position, STRONGEST, rng):
+        lamps.append(LampOnHead(sight.lamps[k], colour, sight.reach[k]))
+        reaches.append(sight.reach[k] * (1 - lost))
     softness = np.exp(rng.uniform(np.log(0.2), np.log(2.5))) * sight.size / 256
     diffuse, specular = ambient, shine * _fresnel(sight)
-    for lamp, colour, reach in zip(lamps, colours, reaches, strict=True):
-        diffuse = diffuse + _softened(sight, np.maximum(sight.normal @ lamp, 0) * reach, softness) * colour
-        specular = specular + (_highlight(sight, lamp, rng.uniform(0.3, 0.5)) * reach)[:, None] * colour
+    for lamp, reach in zip(lamps, reaches, strict=True):
+        direct = np.maximum(sight.normal @ lamp.towards, 0) * reach
+        diffuse = diffuse + _softened(sight, direct, softness) * lamp.colour
+        highlight = _highlight(sight, lamp.towards, rng.uniform(0.3, 0.5)) * reach
+        specular = specular + highlight[:, None] * lamp.colour
     radiance = sight.picture(albedo * diffuse + specular)
     head = sight.picture(np.ones(len(sight.pixel), np.float32))
-    light = float(np.mean(ambient)) + sum(float(np.mean(c)) for c in colours) * 0.5
+    light = float(np.mean(ambient)) + sum(float(np.mean(lamp.colour)) for lamp in lamps) * 0.5
     radiance = np.where(head[..., None] > 0, radiance, _background(environment, sight, light, rng))
-    face = sight.picture(sight.masks[:, MASKS.index("face")])
-    linear, gains = expose(radiance, face > 0.5 if (face > 0.5).any() else head > 0, rng)
+    face = sight.picture(sight.mask("face")) > 0.5
+    linear, gains = expose(radiance, face if face.any() else head > 0, rng)
     haired, tone = rng.random() < 0.35, _tone(sight, albedo)
-    plain = with_lips(tone, albedo, sight.masks[:, MASKS.index("lips")])
+    plain = with_lips(tone, albedo, sight.mask("lips"))
     even = np.clip(sight.picture(plain * diffuse + specular) * gains, 0, 1).astype(np.float32)
     picture, even = np.split(curve(np.concatenate([linear, even]), rng), 2)
-    picture, hair = _haired(picture, sight, rng) if haired else (picture, np.zeros_like(head))
-    truth = sight.picture(albedo)
-    shading = images.srgb_to_linear(picture) / np.maximum(truth, 0.004)
-    shadow, strong = _shadow(sight, lamps, colours, reaches, ambient)
-    bare = 1 - hair
+    bare = np.ones_like(head)
+    if haired:
+        picture, hair = _haired(picture, sight, rng)
+        bare = 1 - hair
+    shadow, strong = _shadow(sight, lamps, reaches, ambient)
     return Portrait(
         develop(picture, rng),
-        truth,
-        shading * (head * bare)[..., None],
+        sight.picture(albedo),
         (images.srgb_to_linear(even) / np.where(head[..., None] > 0, sight.picture(plain), 1)).astype(np.float32),
         sight.picture(shadow),
         strong,
         head * bare,
-        face * bare,
-        sight.picture(sight.masks[:, MASKS.index("skin")] * (1 - sight.masks[:, MASKS.index("eyes")])) * bare,
-        _fitted(sight, carried, environment, lamps, colours, _tone(sight, albedo) * gains, rng),
+        sight.picture(sight.mask("skin") * (1 - sight.mask("eyes"))) * bare,
+        fitted_light(
+            sight.at_pixels(transfer @ BASIS.astype(np.float32)), sight.smooth, lamps, environment, tone * gains, rng
+        ),
     )
 
 
 def _under(
-    environment: Environment, sight: Sight, stage: LightStage, carried: np.ndarray
+    environment: Environment, sight: Sight, stage: LightStage, transfer: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Shading by the environment and its mirror image, [P, 3] each; `carried` is the light transport of the vertices
-    seen."""
+    """Return shading by the environment and its mirror image, [P, 3] each.
+
+    transfer: light transport of the sight's vertices.
+    """
     lit = np.concatenate(
-        [carried @ environment.radiance, mirror_environment(stage, sight.vertices, environment.radiance, sight.eye)], 1
+        [transfer @ environment.radiance, mirror_environment(stage, sight.vertices, environment.radiance, sight.eye)], 1
     )
     ambient, shine = np.split(sight.at_pixels(lit), 2, 1)
     # the stage's vertices know no pores: these turn to its bright side
@@ -137,33 +126,37 @@ def _under(
 
 
 def _brightest(environment: Environment) -> np.ndarray:
-    """The environment's dipole [3]: where its light comes from, of length 1 where all of it comes from there."""
+    """Return the environment's dipole [3]: its light's mean direction, of length 1 if all light comes from there."""
     dipole = (DIRECTIONS * environment.radiance.mean(1, keepdims=True)).mean(0).astype(np.float32)
     return dipole / max(float(environment.radiance.mean()), 1e-6)
 
 
-def _lamps(environment: Environment, sight: Sight, rng: np.random.Generator) -> tuple[list, list, list]:
-    """Up to two lamps beside the environment: unit directions, colours [3] as irradiance over pi, and the share [P] of
-    each that arrives."""
-    lamps, colours, reach = [], [], []
-    for k in rng.permutation(len(sight.lamps))[: rng.choice([0, 1, 1, 1, 1, 2])]:
-        strength = np.exp(rng.uniform(np.log(0.35), np.log(9.0)))
-        warm = rng.normal(0.12, 0.22)
+def draw_lamps(
+    environment: Environment,
+    towards: np.ndarray,
+    radius: np.ndarray,
+    position: np.ndarray,
+    strongest: float,
+    rng: np.random.Generator,
+) -> list[tuple[int, np.ndarray, np.ndarray | float]]:
+    """Draw up to two of the lamps in unit directions [L, 3] beside the environment.
+
+    radius [L] in radians; position [P, 3] in metres, float32. Returns of each its number, its colour [3] as irradiance
+    over pi, and the share [P] of its light that a gobo takes away, 0.0 for none.
+    """
+    lamps = []
+    for k in rng.permutation(len(towards))[: rng.choice([0, 1, 1, 1, 1, 2])]:
+        strength, warm = np.exp(rng.uniform(np.log(0.35), np.log(strongest))), rng.normal(0.12, 0.22)
         colour = strength * np.exp([0.6 * warm, rng.normal(0, 0.04), -warm])
         if environment.colour.any() and rng.random() < 0.5:
             colour = strength * environment.colour / max(float(environment.colour.mean()), 1e-6)
-        lamp = sight.lamps[k]
-        lamps.append(lamp)
-        colours.append(colour.astype(np.float32))
-        reach.append(
-            sight.reach[k] * (1 - cast_gobo(sight.position, lamp, float(sight.radius[k]), str(rng.choice(GOBOS)), rng))
-        )
-    return lamps, colours, reach
+        lost = cast_gobo(position, towards[k], float(radius[k]), str(rng.choice(GOBOS)), rng)
+        lamps.append((int(k), colour.astype(np.float32), lost))
+    return lamps
 
 
 def with_lips(tone: np.ndarray, albedo: np.ndarray, lips: np.ndarray) -> np.ndarray:
-    """The tone [3] of skin, and on lips, of which a pixel has the share `lips` [...], their mean albedo; both linear,
-    [..., 3], as the albedo is."""
+    """Return the skin's tone [3], on lips blended into their mean albedo by the share `lips` [...]: linear [..., 3]."""
     mostly = lips > 0.5
     own = albedo[mostly].mean(0) if mostly.any() else tone
     return (tone + lips[..., None] * (own - tone)).astype(np.float32)
@@ -172,19 +165,9 @@ def with_lips(tone: np.ndarray, albedo: np.ndarray, lips: np.ndarray) -> np.ndar
 def cast_gobo(
     position: np.ndarray, lamp: np.ndarray, radius: float, kind: str, rng: np.random.Generator
 ) -> np.ndarray | float:
-    """What leaves, blinds or an edge before a lamp take away of its light.
+    """Return the share [P] in [0, 1] of a lamp's light that leaves, blinds or an edge take away; 0.0 for none.
 
-    Parameters
-    ----------
-    position : [P, 3], in metres
-    lamp : [3], unit direction to it
-    radius : of the lamp, in radians; above 0.03 counts as that
-    kind : one of GOBOS
-    rng : of the gobo
-
-    Returns
-    -------
-    [P] in [0, 1]; 0 alone for none.
+    position [P, 3] in metres; lamp [3]: unit direction; radius in radians, at most 0.03 counts; kind: one of GOBOS.
     """
     if kind == "none":
         return 0.0
@@ -197,13 +180,13 @@ def cast_gobo(
 
 
 def _fresnel(sight: Sight) -> np.ndarray:
-    """Schlick's reflectance [P, 1] towards the camera, damped at grazing angles as rough skin's is."""
+    """Return Schlick's reflectance [P, 1] towards the camera, damped at grazing angles as rough skin's is."""
     cosine = np.clip(_dot(sight.towards, sight.normal), 0, 1)
     return (sight.gloss + 0.25 * (1 - sight.gloss) * (1 - cosine) ** 5)[:, None]
 
 
 def _highlight(sight: Sight, lamp: np.ndarray, roughness: float) -> np.ndarray:
-    """The Cook-Torrance term times the cosine, times pi to suit irradiance over pi [P] (GGX; Walter et al. 2007)."""
+    """Return the Cook-Torrance term times cosine and pi, for irradiance over pi, [P] (GGX; Walter et al. 2007)."""
     lamp = lamp.astype(np.float32)
     half = sight.towards + lamp
     half /= np.sqrt(_dot(half, half))[:, None]
@@ -216,8 +199,7 @@ def _highlight(sight: Sight, lamp: np.ndarray, roughness: float) -> np.ndarray:
 
 
 def _softened(sight: Sight, direct: np.ndarray, radius: float) -> np.ndarray:
-    """Direct light [P] -> [P, 3] spread under the skin, red farthest (d'Eon et al. 2007); `radius` in pixels, of the
-    red."""
+    """Spread direct light [P] under the skin to [P, 3], red farthest, `radius` pixels (d'Eon et al. 2007)."""
     picture, head = sight.picture(direct.astype(np.float32)), sight.picture(np.ones(len(direct), np.float32))
     channels = []
     for share in (1.0, 0.4, 0.2):
@@ -231,8 +213,7 @@ def _softened(sight: Sight, direct: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _background(environment: Environment, sight: Sight, light: float, rng: np.random.Generator) -> np.ndarray:
-    """What lies behind the head [S, S, 3]: the panorama out of focus, a dark studio, or cloth and walls of any
-    colour."""
+    """Draw a background [S, S, 3]: the panorama out of focus, a dark studio, or cloth and walls of any colour."""
     kind = rng.random()
     if kind < 0.45:
         return background_radiance(environment, sight.rays) * np.float32(np.exp(rng.normal(0, 0.3)))
@@ -251,8 +232,7 @@ def _background(environment: Environment, sight: Sight, light: float, rng: np.ra
 
 
 def _haired(picture: np.ndarray, sight: Sight, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Strands from the crown over the forehead and down the sides, drawn onto an sRGB picture; the picture and where
-    they cover [S, S]."""
+    """Draw strands from the crown down onto an sRGB picture; return it and their cover [S, S]."""
     rows = sight.pixel // sight.size
     columns = sight.pixel % sight.size
     top, left, right = np.quantile(rows, 0.01), np.quantile(columns, 0.02), np.quantile(columns, 0.98)
@@ -260,7 +240,7 @@ def _haired(picture: np.ndarray, sight: Sight, rng: np.random.Generator) -> tupl
     colour = np.clip(
         np.array([0.13, 0.09, 0.07]) * np.exp(rng.normal(0.2, 0.9)) * np.exp(rng.normal(0, 0.15, 3)), 0, 0.8
     )
-    drawn, cover, out = picture.copy(), np.zeros(picture.shape[:2], np.uint8), picture
+    strands, cover = picture.copy(), np.zeros(picture.shape[:2], np.uint8)
     fringe, sides = rng.uniform(0.05, 0.35), rng.uniform(0.1, 0.9)
     for _ in range(int(rng.integers(150, 500))):
         u = rng.uniform(-1, 1)
@@ -271,44 +251,28 @@ def _haired(picture: np.ndarray, sight: Sight, rng: np.random.Generator) -> tupl
         strand = start + t * along + np.sin(3 * t + rng.uniform(0, 6)) * 0.01 * height
         points = [np.round(strand * 8).astype(np.int32)]
         thick = max(1, round(rng.uniform(0.6, 2.2) * sight.size / 256))
-        cv2.polylines(drawn, points, False, (colour * np.exp(rng.normal(0, 0.35))).tolist(), thick, cv2.LINE_AA, 3)
+        cv2.polylines(strands, points, False, (colour * np.exp(rng.normal(0, 0.35))).tolist(), thick, cv2.LINE_AA, 3)
         cv2.polylines(cover, points, False, 1, thick, cv2.LINE_8, 3)
     covered = cv2.dilate(cover, np.ones((3, 3), np.uint8))
-    return np.where(covered[..., None] > 0, drawn, out).astype(np.float32), covered.astype(np.float32)
+    return np.where(covered[..., None] > 0, strands, picture).astype(np.float32), covered.astype(np.float32)
 
 
-def _shadow(sight: Sight, lamps: list, colours: list, reach: list, ambient: np.ndarray) -> tuple[np.ndarray, float]:
-    """The lost share [P] of the lamps' light, weighted by their strength, and how much of all light they are, in [0,
-    1]."""
+def _shadow(
+    sight: Sight, lamps: list[LampOnHead], reaches: list[np.ndarray], ambient: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Return the lost share [P] of the lamps' light, weighted by strength, and its share in all light, in [0, 1]."""
     if not lamps:
         return np.zeros(len(sight.pixel), np.float32), 0.0
-    strength = np.array([float(np.mean(c)) for c in colours])
+    strength = np.array([float(np.mean(lamp.colour)) for lamp in lamps])
     # what turns away from a lamp is in its shadow too
-    facing = [np.clip(1 + (sight.smooth @ lamp) / 0.06, 0, 1) for lamp in lamps]
-    lost = sum(s * (1 - r * f) for s, r, f in zip(strength, reach, facing, strict=True))
+    facing = [np.clip(1 + (sight.smooth @ lamp.towards) / 0.06, 0, 1) for lamp in lamps]
+    lost = sum(s * (1 - r * f) for s, r, f in zip(strength, reaches, facing, strict=True))
     return (lost / strength.sum()).astype(np.float32), float(strength.sum() / (strength.sum() + ambient.mean()))
 
 
-def _fitted(
-    sight: Sight,
-    carried: np.ndarray,
-    environment: Environment,
-    lamps: list,
-    colours: list,
-    tone: np.ndarray,
-    rng: np.random.Generator,
-) -> FittedLight:
-    transfer = sight.at_pixels(carried @ BASIS.astype(np.float32))
-    shining = [
-        LampOnHead(lamp, colour, sight.reach[np.argmax(sight.lamps @ lamp)])
-        for lamp, colour in zip(lamps, colours, strict=True)
-    ]
-    return fitted_light(transfer, sight.smooth, shining, environment, tone, rng)
-
-
 def _tone(sight: Sight, albedo: np.ndarray) -> np.ndarray:
-    """The mean albedo [3] of what skin is seen."""
-    skin = sight.masks[:, MASKS.index("skin")] * (1 - sight.masks[:, MASKS.index("eyes")]) > 0.5
+    """Return the mean albedo [3] of the visible skin."""
+    skin = sight.mask("skin") * (1 - sight.mask("eyes")) > 0.5
     return (albedo[skin] if skin.any() else albedo).mean(0)
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Regions of the face as smooth weights in [0, 1] around anatomical landmarks, and the curves along which skin creases.
+"""Regions of the face as smooth weights in [0, 1] around landmarks, and the curves along which skin creases.
 
 Numbers are MediaPipe face-mesh landmarks, (right, left) of the person; distances are millimetres on an adult head.
 """
@@ -14,30 +14,11 @@ from .canvas import Canvas
 
 JAW = [132, 58, 172, 136, 150, 149, 176, 148, 152, 377, 400, 378, 379, 365, 397, 288, 361]
 MOUSTACHE = [92, 165, 167, 164, 393, 391, 322]
+# fmt: off
 LOWER_CHEEK = [
-    214,
-    434,
-    192,
-    416,
-    213,
-    433,
-    147,
-    376,
-    135,
-    364,
-    169,
-    394,
-    210,
-    430,
-    211,
-    431,
-    138,
-    367,
-    215,
-    435,
-    177,
-    401,
+    214, 434, 192, 416, 213, 433, 147, 376, 135, 364, 169, 394, 210, 430, 211, 431, 138, 367, 215, 435, 177, 401,
 ]
+# fmt: on
 GOATEE = [18, 200, 199, 201, 421, 204, 424, 202, 422, 212, 432, 57, 287, 43, 273, 83, 313]
 LIDS = [33, 7, 163, 144, 145, 153, 154, 155, 133], [362, 382, 381, 380, 374, 373, 390, 249, 263]
 SIDEBURNS = [127, 234, 93, 356, 454, 323]
@@ -54,8 +35,10 @@ BLOBS = {  # name -> (landmark, radius in mm) ...
 
 
 def regions(on: Canvas) -> dict[str, np.ndarray]:
-    """Weights float32 [N] by name: the BLOBS, the template's masks softened at their edges, beard, oily (T-zone), bald
-    (bare of long hair)."""
+    """Return weights float32 [N] by name.
+
+    The BLOBS, the template's masks softened at their edges, beard, oily (T-zone), bald (bare of long hair).
+    """
     if not on.cache:
         for name, blobs in BLOBS.items():
             on.cache[name] = on.soft(lambda points, blobs=blobs: _blobs(points, on.landmarks, blobs))
@@ -80,34 +63,21 @@ def regions(on: Canvas) -> dict[str, np.ndarray]:
 
 
 def creases(on: Canvas, rng: np.random.Generator) -> list[tuple[np.ndarray, float, float, float]]:
-    """Where an ageing face folds: (curve [M, 3] in mm, width in mm, depth in mm at a great age, age in years at which
-    it begins)."""
+    """Return the folds of an ageing face.
+
+    Each is (curve [M, 3] in mm, width in mm, depth in mm at a great age, age in years at which it begins).
+    """
     at = on.landmarks
     lines: list[tuple[np.ndarray, float, float, float]] = []
 
     def add(points: np.ndarray, width: float, depth: float, begins: float) -> None:
-        wobble = rng.normal(0, 1.2, points.shape) * [1, 0, 1]
-        lines.append(
-            (
-                _curve(points + wobble),
-                width * rng.uniform(0.8, 1.3),
-                depth * rng.uniform(0.6, 1.4),
-                begins + rng.normal(0, 6),
-            )
-        )
+        curve = _curve(points + rng.normal(0, 1.2, points.shape) * [1, 0, 1])
+        width, depth = width * rng.uniform(0.8, 1.3), depth * rng.uniform(0.6, 1.4)
+        lines.append((curve, width, depth, begins + rng.normal(0, 6)))
 
+    low, high = at[[70, 105, 107, 9, 336, 334, 300]], at[[54, 103, 109, 10, 338, 332, 284]]
     for share in (0.25, 0.45, 0.65, 0.85):  # across the forehead
-        add(
-            np.stack(
-                [
-                    at[low] + share * (at[high] - at[low])
-                    for low, high in ((70, 54), (105, 103), (107, 109), (9, 10), (336, 338), (334, 332), (300, 284))
-                ]
-            ),
-            1.6,
-            0.25,
-            34,
-        )
+        add(low + share * (high - low), 1.6, 0.25, 34)
     for side in ((129, 203, 206, 216, 212), (358, 423, 426, 436, 432)):  # beside the nose and mouth
         add(at[list(side)], 2.4, 0.35, 30)
     for side in ((61, 202, 204), (291, 422, 424)):  # below the corners of the mouth
@@ -125,23 +95,20 @@ def creases(on: Canvas, rng: np.random.Generator) -> list[tuple[np.ndarray, floa
 
 
 def lid_lines(on: Canvas) -> np.ndarray:
-    """Where the lids meet: points [M, 3] in mm along the lower lids' rims."""
+    """Return points [M, 3] in mm along the lower lids' rims, where the lids meet."""
     return np.concatenate([_curve(on.landmarks[side]) for side in LIDS])
 
 
 def _blobs(points: np.ndarray, landmarks: np.ndarray, blobs: list[tuple[int, float]]) -> np.ndarray:
-    """One minus the product of what each Gaussian leaves, [M]."""
-    left = np.ones(len(points), np.float32)
+    """Return one minus the product of what each Gaussian leaves, [M]."""
+    remainder = np.ones(len(points), np.float32)
     for landmark, radius in blobs:
-        left *= 1 - _gaussian(points, landmarks[landmark], radius)
-    return 1 - left
+        remainder *= 1 - _gaussian(points, landmarks[landmark], radius)
+    return 1 - remainder
 
 
 def _around(points: np.ndarray, centres: np.ndarray, radius: float) -> np.ndarray:
-    weight = np.zeros(len(points), np.float32)
-    for centre in centres:
-        np.maximum(weight, _gaussian(points, centre, radius), out=weight)
-    return weight
+    return np.max([_gaussian(points, centre, radius) for centre in centres], axis=0)
 
 
 def _gaussian(points: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
@@ -150,7 +117,7 @@ def _gaussian(points: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarr
 
 
 def _softened(on: Canvas, name: str, radius: float) -> np.ndarray:
-    """A mask blurred by `radius` mm (as a mean over the charts' scale), the charts' outside not counted."""
+    """Blur a mask by `radius` mm (a mean over the charts' scale), the charts' outside not counted."""
     sigma = radius / on.texel_mm
     picture = np.zeros((on.size, on.size), np.float32)
     picture[on.covered] = on.masks[name]
@@ -159,7 +126,7 @@ def _softened(on: Canvas, name: str, radius: float) -> np.ndarray:
 
 
 def _curve(points: np.ndarray, step: float = 0.4) -> np.ndarray:
-    """A Catmull-Rom curve through points [P, 3] in mm, sampled about every `step` mm."""
+    """Sample a Catmull-Rom curve through points [P, 3] in mm about every `step` mm."""
     padded = np.concatenate([2 * points[:1] - points[1:2], points, 2 * points[-1:] - points[-2:-1]])
     pieces = []
     for a, b, c, d in zip(padded[:-3], padded[1:-2], padded[2:-1], padded[3:], strict=True):

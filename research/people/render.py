@@ -1,12 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames of a synthetic subject, path-traced by Cycles. With people/render.py the only file of core that imports
-bpy; a process of its own:
+"""Frames of a subject, path-traced by Cycles: python -m research.people.render JOB.json.
 
-    python -m research.people.render JOB.json
-
-The job (written by sample.py) names the head, its maps, the leaves, the sun, the sky, the cameras and the output
-folder. Frames that exist are not rendered again.
+The only file of research/people that imports bpy; a process of its own. The job (rendering.py) names meshes (.npz) with
+their materials, strands (.npz), the light, the cameras and the head's place in each frame. Existing frames are not
+rendered again.
 """
 
 from __future__ import annotations
@@ -15,12 +13,11 @@ import json
 import math
 import os
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from core.geometry.meshes import Mesh, read_obj
+from core.geometry.meshes import read_obj
 
 from .blender_module import without_numpy_1
 
@@ -28,67 +25,31 @@ with without_numpy_1():
     import bpy
     from mathutils import Matrix, Vector
 
+GLOSS = {"skin": (0.5, None), "eyes": (0.06, 0.5), "cloth": (0.9, 0.2), "hair": (0.45, 0.35)}
+"""Roughness and Specular IOR Level; the skin has a map of its own."""
+
 
 def main() -> None:
     job = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-    apply_settings(scene, job)
-    add_mesh(read_obj(Path(job["head"])), "head", _skin(job["maps"]))
+    _apply_settings(scene, job)
+    body = _link("head", None)
+    for name, part in job["meshes"].items():
+        _add_part(name, part).parent = body
+    for path in job["strands"]:
+        _add_strands(Path(path)).parent = body
     if job["leaves"]:
-        # they are nearer than the camera
-        add_mesh(read_obj(Path(job["leaves"])), "leaves", plain("leaves", (0.05, 0.13, 0.03))).visible_camera = False
-    add_lights(scene, job)
+        _add_leaves(Path(job["leaves"]))
+    _add_lights(scene, job)
     if job["room"]:
-        add_room(job["seed"])
-    _torso(job["seed"])
-    camera = add_camera(scene, job)
-    render_frames(scene, camera, job)
+        _add_room(job["seed"])
+    if job["torso"]:
+        _add_torso(job["seed"])
+    _render_frames(scene, _add_camera(scene, job), body, job)
 
 
-def add_camera(scene: bpy.types.Scene, job: dict) -> bpy.types.Object:
-    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    camera.data.sensor_fit = 'VERTICAL'
-    camera.data.sensor_height = 24
-    camera.data.lens = job["focal_px"] * 24 / job["height"]
-    camera.data.clip_start = 0.05
-    if job["flash"]:
-        lamp = bpy.data.lights.new("flash", 'POINT')
-        lamp.energy, lamp.shadow_soft_size = job["flash"], 0.004
-        flash = bpy.data.objects.new("flash", lamp)
-        flash.parent = camera
-        scene.collection.objects.link(flash)
-    return camera
-
-
-def render_frames(
-    scene: bpy.types.Scene, camera: bpy.types.Object, job: dict, place: Callable[[int], None] = lambda number: None
-) -> None:
-    """Renders the job's frames that do not exist yet.
-
-    Parameters
-    ----------
-    scene : with everything in it
-    camera : moves to where it is in each frame
-    job : what was written for it (sample.py)
-    place : number of a frame -> None, puts what else moves where it is in it
-    """
-    for number in job["frames"]:
-        path = Path(job["out"]) / f"{number:05d}{job['suffix']}"
-        if path.exists():
-            continue
-        place(number)
-        camera.matrix_world = Matrix(job["cameras"][number])
-        temporary = path.with_suffix(f".part{job['suffix']}")
-        scene.render.filepath = str(temporary)
-        bpy.ops.render.render(write_still=True)
-        os.replace(temporary, path)
-        print(f"frame {number}", flush=True)
-
-
-def apply_settings(scene: bpy.types.Scene, job: dict) -> None:
+def _apply_settings(scene: bpy.types.Scene, job: dict) -> None:
     scene.render.engine = 'CYCLES'
     scene.cycles.samples = job["samples"]
     scene.cycles.use_denoising, scene.cycles.denoising_quality, scene.cycles.denoising_prefilter = True, 'FAST', 'FAST'
@@ -96,6 +57,7 @@ def apply_settings(scene: bpy.types.Scene, job: dict) -> None:
     scene.cycles.glossy_bounces = 1
     scene.cycles.use_adaptive_sampling = False
     scene.cycles.seed = job["seed"] % 65536
+    scene.cycles_curves.shape = 'RIBBONS'
     scene.render.resolution_x, scene.render.resolution_y = job["width"], job["height"]
     scene.render.resolution_percentage = 100
     # an EXR holds linear light
@@ -104,50 +66,102 @@ def apply_settings(scene: bpy.types.Scene, job: dict) -> None:
     scene.view_settings.view_transform = 'Standard'
 
 
-def add_mesh(mesh: Mesh, name: str, material: bpy.types.Material) -> bpy.types.Object:
-    data = bpy.data.meshes.new(name)
-    data.from_pydata(mesh.vertices.tolist(), [], mesh.faces.tolist())
-    if mesh.uvs is not None:
-        layer = data.uv_layers.new(name="UVMap")
-        layer.data.foreach_set("uv", mesh.uvs[mesh.face_uvs].astype(np.float32).ravel())
-        data.shade_smooth()
-    data.materials.append(material)
+def _render_frames(scene: bpy.types.Scene, camera: bpy.types.Object, body: bpy.types.Object, job: dict) -> None:
+    for number in job["frames"]:
+        path = Path(job["out"]) / f"{number:05d}{job['suffix']}"
+        if path.exists():
+            continue
+        body.matrix_world, camera.matrix_world = Matrix(job["poses"][number]), Matrix(job["cameras"][number])
+        temporary = path.with_suffix(f".part{job['suffix']}")
+        scene.render.filepath = str(temporary)
+        bpy.ops.render.render(write_still=True)
+        os.replace(temporary, path)
+
+
+def _link(name: str, data: bpy.types.ID | None) -> bpy.types.Object:
+    """Add an object to the scene."""
     thing = bpy.data.objects.new(name, data)
     bpy.context.scene.collection.objects.link(thing)
     return thing
 
 
-def _skin(maps: dict) -> bpy.types.Material:
-    """Albedo, gloss and relief as the truth says; no subsurface scattering, so that albedo means the same in the
-    picture and in the truth."""
-    material, nodes, links, shader = principled("skin")
+def _add_camera(scene: bpy.types.Scene, job: dict) -> bpy.types.Object:
+    """Add the camera, and the flash that goes with it."""
+    scene.camera = camera = _link("camera", bpy.data.cameras.new("camera"))
+    camera.data.sensor_fit = 'VERTICAL'
+    camera.data.sensor_height = 24
+    camera.data.lens = job["focal_px"] * 24 / job["height"]
+    camera.data.clip_start = 0.05
+    if job["flash"]:
+        lamp = bpy.data.lights.new("flash", 'POINT')
+        lamp.energy, lamp.shadow_soft_size = job["flash"], 0.004
+        _link("flash", lamp).parent = camera
+    return camera
 
-    def texture(name: str, space: str) -> bpy.types.Node:
+
+def _add_part(name: str, part: dict) -> bpy.types.Object:
+    """Add a mesh with UVs at its corners and the material of its kind."""
+    with np.load(part["mesh"], allow_pickle=False) as stored:
+        vertices, faces, uv = stored["vertices"], stored["faces"], stored["uv"]
+    data = bpy.data.meshes.new(name)
+    data.from_pydata(vertices.tolist(), [], faces.tolist())
+    data.uv_layers.new(name="UVMap").data.foreach_set("uv", uv.astype(np.float32).ravel())
+    data.shade_smooth()
+    data.materials.append(_textured(name, part))
+    return _link(name, data)
+
+
+def _textured(name: str, part: dict) -> bpy.types.Material:
+    """Make a part's material, without subsurface scattering: albedo means the same in the picture and in the truth."""
+    material, nodes, links, shader = _principled(name, *GLOSS[part["kind"]])
+
+    def texture(path: str, space: str) -> bpy.types.NodeSocket:
         node = nodes.new("ShaderNodeTexImage")
-        node.image = bpy.data.images.load(maps[name])
+        node.image = bpy.data.images.load(path)
         node.image.colorspace_settings.name = space
-        return node
+        return node.outputs["Color"]
 
-    links.new(texture("diffuse", "sRGB").outputs["Color"], shader.inputs["Base Color"])
-    links.new(texture("specular", "Non-Color").outputs["Color"], shader.inputs["Specular IOR Level"])
-    normal = nodes.new("ShaderNodeNormalMap")
-    normal.uv_map = "UVMap"
-    links.new(texture("normal", "Non-Color").outputs["Color"], normal.inputs["Color"])
-    links.new(normal.outputs["Normal"], shader.inputs["Normal"])
-    shader.inputs["Roughness"].default_value = 0.5
+    links.new(texture(part["albedo"], "sRGB"), shader.inputs["Base Color"])
+    if part["kind"] == "skin":
+        links.new(texture(part["specular"], "Non-Color"), shader.inputs["Specular IOR Level"])
+        normal = nodes.new("ShaderNodeNormalMap")
+        normal.uv_map = "UVMap"
+        links.new(texture(part["normal"], "Non-Color"), normal.inputs["Color"])
+        links.new(normal.outputs["Normal"], shader.inputs["Normal"])
     return material
 
 
-def plain(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
-    material, _, _, shader = principled(name)
-    shader.inputs["Base Color"].default_value = (*colour, 1)
-    shader.inputs["Roughness"].default_value = 0.8
-    return material
+def _add_strands(path: Path) -> bpy.types.Object:
+    """Add hairs as curves with their own radius and colour."""
+    with np.load(path, allow_pickle=False) as stored:
+        points, radius, colour = stored["points"], stored["radius"], stored["colour"]
+    curves = bpy.data.hair_curves.new(path.stem)
+    curves.add_curves([points.shape[1]] * len(points))
+    curves.position_data.foreach_set("vector", points.astype(np.float32).ravel())
+    curves.attributes.new("radius", 'FLOAT', 'POINT').data.foreach_set("value", radius.astype(np.float32).ravel())
+    tint = np.concatenate([colour, np.ones((len(colour), 1))], 1)
+    curves.attributes.new("tint", 'FLOAT_COLOR', 'CURVE').data.foreach_set("color", tint.astype(np.float32).ravel())
+    material, nodes, links, shader = _principled("hair", *GLOSS["hair"])
+    own = nodes.new("ShaderNodeAttribute")
+    own.attribute_name = "tint"
+    links.new(own.outputs["Color"], shader.inputs["Base Color"])
+    curves.materials.append(material)
+    return _link(path.stem, curves)
 
 
-def patterned(name: str, rng: np.random.Generator, scale: float) -> bpy.types.Material:
-    """Two colours mixed by a random texture: corners and blobs for structure from motion."""
-    material, nodes, links, shader = principled(name)
+def _add_leaves(path: Path) -> None:
+    """Add the leaves, which are nearer than the camera and unseen by it."""
+    mesh, data = read_obj(path), bpy.data.meshes.new("leaves")
+    data.from_pydata(mesh.vertices.tolist(), [], mesh.faces.tolist())
+    material, _, _, shader = _principled("leaves", 0.8)
+    shader.inputs["Base Color"].default_value = (0.05, 0.13, 0.03, 1)
+    data.materials.append(material)
+    _link("leaves", data).visible_camera = False
+
+
+def _patterned(name: str, rng: np.random.Generator, scale: float) -> bpy.types.Material:
+    """Mix two colours by a random texture: corners and blobs for structure from motion."""
+    material, nodes, links, shader = _principled(name, 0.8)
     # neither repeats: what repeats misleads the matching of features
     kind = rng.choice(["ShaderNodeTexVoronoi", "ShaderNodeTexNoise"])
     texture, ramp, place = nodes.new(kind), nodes.new("ShaderNodeValToRGB"), nodes.new("ShaderNodeTexCoord")
@@ -160,71 +174,74 @@ def patterned(name: str, rng: np.random.Generator, scale: float) -> bpy.types.Ma
     for element in ramp.color_ramp.elements:
         element.color = (*(rng.uniform(0.02, 0.55) * rng.uniform(0.5, 1, 3)), 1)
     links.new(ramp.outputs["Color"], shader.inputs["Base Color"])
-    shader.inputs["Roughness"].default_value = 0.8
     return material
 
 
-def principled(name: str):
+def _principled(name: str, roughness: float, specular: float | None = None) -> tuple:
+    """Make a material; return it, its nodes and links, and its Principled BSDF."""
     material = bpy.data.materials.new(name)
     tree = _tree(material)
-    return material, tree.nodes, tree.links, tree.nodes["Principled BSDF"]
+    shader = tree.nodes["Principled BSDF"]
+    shader.inputs["Roughness"].default_value = roughness
+    if specular is not None:
+        shader.inputs["Specular IOR Level"].default_value = specular
+    return material, tree.nodes, tree.links, shader
 
 
 def _tree(block: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree:
-    """The nodes of a new material or world, which it has from its start in Blender 5."""
+    """Return the nodes of a new material or world, which in Blender 5 has them from its start."""
     if block.node_tree is None:
         block.use_nodes = True
     return block.node_tree
 
 
-def add_lights(scene: bpy.types.Scene, job: dict) -> None:
+def _add_lights(scene: bpy.types.Scene, job: dict) -> None:
     if job["sun"]:
         sun = bpy.data.lights.new("sun", 'SUN')
         sun.energy, sun.angle, sun.color = job["sun"]["strength"], job["sun"]["angle"], job["sun"]["colour"]
-        _hang(scene, sun, Vector(job["sun"]["direction"]), Vector())
+        _hang(sun, Vector(job["sun"]["direction"]), Vector())
     for lamp in job["lamps"]:
         area = bpy.data.lights.new("lamp", 'AREA')
         area.energy, area.size, area.color = lamp["power"], lamp["size"], lamp["colour"]
-        _hang(scene, area, Vector(lamp["position"]), Vector(lamp["position"]))
+        _hang(area, Vector(lamp["position"]), Vector(lamp["position"]))
     scene.world = bpy.data.worlds.new("sky")
     tree = _tree(scene.world)
-    nodes = tree.nodes
+    colour = tree.nodes["Background"].inputs["Color"]
     if isinstance(job["sky"], str):
-        panorama = nodes.new("ShaderNodeTexEnvironment")
+        panorama = tree.nodes.new("ShaderNodeTexEnvironment")
         panorama.image = bpy.data.images.load(job["sky"])
-        tree.links.new(panorama.outputs["Color"], nodes["Background"].inputs["Color"])
+        tree.links.new(panorama.outputs["Color"], colour)
     else:
-        nodes["Background"].inputs["Color"].default_value = (*job["sky"], 1)
+        colour.default_value = (*job["sky"], 1)
 
 
-def _hang(scene: bpy.types.Scene, light: bpy.types.Light, towards: Vector, position: Vector) -> None:
-    """Puts a light in the direction `towards` of the head; a lamp shines along its -z."""
-    thing = bpy.data.objects.new(light.name, light)
+def _hang(light: bpy.types.Light, towards: Vector, position: Vector) -> None:
+    """Add a light in the direction `towards` of the head; it shines along its -z."""
+    thing = _link(light.name, light)
     thing.rotation_euler, thing.location = towards.to_track_quat('Z', 'Y').to_euler(), position
-    scene.collection.objects.link(thing)
 
 
-def add_room(seed: int, count: int = 90) -> None:
-    """Boxes of all sizes around and behind the head, and a floor, all patterned."""
+def _add_room(seed: int) -> None:
+    """Add boxes of all sizes around and behind the head, and a floor, all patterned."""
     rng = np.random.default_rng([seed, 23])
-    materials = [patterned(f"pattern{k}", rng, rng.uniform(8, 40)) for k in range(14)]
-    for k in range(count):
+    materials = [_patterned(f"pattern{k}", rng, rng.uniform(8, 40)) for k in range(14)]
+    for k in range(90):
         azimuth, radius = np.radians(rng.uniform(-205, 25)) + math.pi, rng.uniform(0.8, 2.4)
         position = (radius * math.cos(azimuth), radius * math.sin(azimuth), rng.uniform(-1.0, 1.0))
         bpy.ops.mesh.primitive_cube_add(size=1, location=position, rotation=rng.uniform(-0.6, 0.6, 3))
         bpy.context.object.scale = rng.uniform(0.08, 0.45, 3) * radius / 1.5
         bpy.context.object.data.materials.append(materials[k % len(materials)])
     bpy.ops.mesh.primitive_plane_add(size=12, location=(0, 0, -1.2))
-    bpy.context.object.data.materials.append(patterned("floor", rng, 6))
+    bpy.context.object.data.materials.append(_patterned("floor", rng, 6))
 
 
-def _torso(seed: int) -> None:
-    """A shirt of sorts: an ellipsoid under the neck."""
+def _add_torso(seed: int) -> None:
+    """Add a shirt of sorts: an ellipsoid under the neck."""
     rng = np.random.default_rng([seed, 24])
     bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, location=(0, 0.07, -0.34))
     bpy.context.object.scale = (0.21, 0.13, 0.19)
     bpy.ops.object.shade_smooth()
-    bpy.context.object.data.materials.append(patterned("shirt", rng, 90))
+    bpy.context.object.data.materials.append(_patterned("shirt", rng, 90))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From scene radiance to the file a phone writes: exposure, white balance, tone curve, clipping, blur, noise and
-compression."""
+"""Scene radiance to the file a phone writes: exposure, white balance, tone curve, blur, noise and compression."""
 
 from __future__ import annotations
 
@@ -12,7 +11,7 @@ from core.imaging import images
 
 
 def expose(radiance: np.ndarray, metered_on: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Linear radiance [S, S, 3] as the sensor takes it, clipped to [0, 1], and the factor [3] it was multiplied by.
+    """Return linear radiance [S, S, 3] as the sensor takes it, clipped to [0, 1], and the gain [3] applied.
 
     Metered on the pixels `metered_on` bool [S, S] and on the whole picture in random parts; the white balance forgives
     most of the light's colour, not all.
@@ -24,16 +23,14 @@ def expose(radiance: np.ndarray, metered_on: np.ndarray, rng: np.random.Generato
     cast = radiance[metered_on].mean(0) / radiance[metered_on].mean() / [1.35, 0.92, 0.73]  # against usual skin
     cast = rng.uniform(0, 0.8) * np.log(np.clip(cast, 0.2, 5))
     gains = exposure * np.exp(-cast + rng.normal(0, [0.10, 0.04, 0.14]))
-    gains = (
-        np.minimum(gains, 1.6 / max(float(np.quantile((radiance[metered_on] * gains).max(-1), 0.9)), 1e-6) * gains)
-        if rng.random() < 0.9
-        else gains
-    )
+    if rng.random() < 0.9:
+        bright = max(float(np.quantile((radiance[metered_on] * gains).max(-1), 0.9)), 1e-6)
+        gains = np.minimum(gains, 1.6 / bright * gains)
     return np.clip(radiance * gains, 0, 1).astype(np.float32), gains
 
 
 def curve(linear: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Linear [..., 3] to sRGB under a camera's own taste: contrast about the middle and saturation, mild."""
+    """Encode linear [..., 3] as sRGB with a camera's own mild contrast about the middle and saturation."""
     srgb = images.linear_to_srgb(linear)
     contrast, lift = rng.normal(0, 0.25), rng.normal(0, 0.02)
     srgb = srgb + contrast * srgb * (1 - srgb) * (2 * srgb - 1) + lift * (1 - srgb)
@@ -42,8 +39,7 @@ def curve(linear: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def develop(srgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """A clean sRGB picture [S, S, 3] blurred, sharpened, noisy and compressed, as bytes would hold it; float32 in [0,
-    1]."""
+    """Blur, sharpen, add noise to and compress an sRGB picture [S, S, 3]; float32 in [0, 1], of bytes."""
     if rng.random() < 0.6:
         srgb = cv2.GaussianBlur(srgb, (0, 0), rng.uniform(0.3, 1.1))
     if rng.random() < 0.3:
@@ -56,7 +52,6 @@ def develop(srgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         srgb = srgb + level * np.sqrt(np.clip(srgb, 0.02, 1)) * noise
     pixels = np.round(255 * np.clip(srgb, 0, 1)).astype(np.uint8)
     if rng.random() < 0.7:
-        pixels = cv2.imdecode(
-            cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(45, 97))])[1], cv2.IMREAD_COLOR
-        )
+        _, stored = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(45, 97))])
+        pixels = cv2.imdecode(stored, cv2.IMREAD_COLOR)
     return pixels.astype(np.float32) / 255

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A subject's hand-held video and its truth, in the layout that benchmarks read:
+"""A subject's hand-held video and its truth, in the layout that benchmarks read.
 
     python -m research.people.sample [--out FOLDER] [--work FOLDER] [--seed N] [--frames N] [--samples N] [--only
     0,36,...]
@@ -14,32 +14,28 @@ stopped.
 from __future__ import annotations
 
 import argparse
-import json
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterable
-from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
 
 import av
 import numpy as np
-import pycolmap
 
 from core.capture.files import replacing, write_json
 from core.face import template
-from core.geometry import meshes, raster
+from core.geometry import raster
 from core.geometry.meshes import Mesh, joined, vertex_normals
 from core.geometry.views import View
 from core.imaging import images
 
 from . import scene
-from .identities import subject_mesh
+from .cameras import pinhole_view
+from .identities import RESERVED, subject_mesh
 from .parameters import sample_parameters
+from .rendering import render_parts, write_skin
 from .skin import Skin, make_skin
 
-RESERVED = json.loads((Path(__file__).parent / "reserved.json").read_text(encoding="utf-8"))
 SAMPLE = Path(__file__).parent / "sample"
 MAPS = 2048  # texels along a side of the subject's maps
 TRUTHS = 14  # frames whose truth is written
@@ -54,14 +50,10 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=7)
     parser.add_argument("--only", help="render these frames only, and write nothing else")
     options = parser.parse_args()
-    wanted = [int(n) for n in options.only.split(",")] if options.only else list(range(options.frames))
+    frames = [int(n) for n in options.only.split(",")] if options.only else list(range(options.frames))
     skin = make_skin(sample_parameters(options.seed), MAPS)
-    render_frames(
-        options.work,
-        options.seed,
-        skin,
-        scene.Shot(scene.camera_path(options.seed, options.frames), wanted, options.samples),
-    )
+    shot = scene.Shot(scene.camera_path(options.seed, options.frames), frames, options.samples)
+    render_frames(options.work, options.seed, skin, shot)
     if not options.only:
         write_sample(options.out, options.work, options.seed, skin, options.frames)
 
@@ -74,74 +66,22 @@ def render_frames(
     leaves: bool = True,
     light: scene.SceneLight | None = None,
     suffix: str = ".png",
-    head: Mesh | None = None,
 ) -> None:
-    """Renders a bald subject to work/NNNNN.png by Cycles in a process of its own; files that exist are kept.
+    """Render a bald subject by Cycles to work/NNNNN.png; existing files stay.
 
-    Parameters
-    ----------
-    work : folder of the job and its pictures
-    seed : the subject
-    skin : its maps
-    shot : frames, cameras and quality; the head keeps still, and the focal length is the sample's
-    leaves : whether they stand between the sun and the head
-    light : instead of the sample's sun, sky and leaves
-    suffix : .exr for linear light
-    head : of the built-in topology, instead of the subject's own
+    leaves: between the sun and the head; light: instead of the sample's sun, sky and leaves; suffix: .exr for linear
+    light.
     """
-    work.mkdir(parents=True, exist_ok=True)
     sun = scene.sun_of(seed)
     light = light or scene.SceneLight(scene.SKY, sun, scene.strew_leaves(seed, sun) if leaves else None)
-    meshes.write_obj(work / "head.obj", head or subject_mesh(seed))
-    if light.blockers:
-        meshes.write_obj(work / "leaves.obj", light.blockers)
-    sky = light.sky
-    if isinstance(sky, np.ndarray):
-        images.write_linear(work / "sky.exr", sky)
-        sky = str(work / "sky.exr")
-    images.write_srgb(work / "diffuse.png", images.linear_to_srgb(skin.diffuse), bits=16)
-    images.write_data(work / "specular.png", skin.specular, bits=16)
-    images.write_data(work / "normal.png", skin.normal / 2 + 0.5, bits=16)
-    write_json(
-        work / "job.json",
-        {
-            "seed": seed,
-            "room": shot.room,
-            "head": str(work / "head.obj"),
-            "leaves": str(work / "leaves.obj") if light.blockers else None,
-            "suffix": suffix,
-            "out": str(work),
-            "frames": shot.frames,
-            "samples": shot.samples,
-            "maps": {name: str(work / f"{name}.png") for name in ("diffuse", "specular", "normal")},
-            "cameras": shot.cameras.tolist(),
-            "sun": asdict(light.sun) | {"direction": light.sun.direction.tolist()} if light.sun else None,
-            "sky": sky,
-            "lamps": [asdict(lamp) for lamp in light.lamps],
-            "flash": light.flash,
-            "width": round(scene.WIDTH * shot.scale),
-            "height": round(scene.HEIGHT * shot.scale),
-            "focal_px": scene.FOCAL * shot.scale,
-        },
-    )
-    subprocess.run(
-        [sys.executable, "-m", "research.people.render", str(work / "job.json")],
-        cwd=Path(__file__).parents[2],
-        check=True,
-    )
+    mesh = subject_mesh(seed)
+    mesh = mesh.moved(mesh.vertices.round(6))  # to a micrometre, as the sample and all records were rendered
+    parts = {"head": write_skin(work, mesh, skin.diffuse, skin.specular, skin.normal)}
+    render_parts(work, seed, parts, [], light, shot, suffix, torso=True)
 
 
 def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> None:
-    """Writes the video and its truth from rendered frames.
-
-    Parameters
-    ----------
-    out : folder of both
-    work : folder of the frames, NNNNN.png
-    seed : the subject
-    skin : its maps, MAPS texels wide
-    frames : their number
-    """
+    """Write the video and its truth from frames work/NNNNN.png, their number, and the skin, MAPS texels wide."""
     out.mkdir(parents=True, exist_ok=True)
     cameras = scene.camera_path(seed, frames)
     write_json(
@@ -176,50 +116,34 @@ def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> N
 
 
 def truth_frames(frames: int) -> list[int]:
-    """Which frames get their truth: evenly spread, the outermost left out."""
+    """Return the frames that get their truth: evenly spread, the outermost left out."""
     return np.unique(np.linspace(3, frames - 4, TRUTHS).round().astype(int)).tolist()
 
 
 def view_of(matrix: np.ndarray, scale: float = 1.0) -> View:
-    """A Blender camera-to-world matrix [4, 4] (looks along -z, y up) as a view; `scale`: of the picture's size."""
+    """Return a Blender camera-to-world matrix [4, 4] (looks along -z, y up) as a view, the picture scaled."""
     rotation = np.diag([1, -1, -1]) @ matrix[:3, :3].T
-    width, height, focal = round(scene.WIDTH * scale), round(scene.HEIGHT * scale), scene.FOCAL * scale
-    camera = pycolmap.Camera(
-        camera_id=1, model="PINHOLE", width=width, height=height, params=[focal, focal, width / 2, height / 2]
-    )
-    return View("", Path(), camera, rotation, -rotation @ matrix[:3, 3], True)
+    width, height = round(scene.WIDTH * scale), round(scene.HEIGHT * scale)
+    middle = np.array([width / 2, height / 2])
+    return pinhole_view((width, height), scene.FOCAL * scale, middle, rotation, -rotation @ matrix[:3, 3])
 
 
 def trace_frame_truth(
     head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarray | None, over: int = 2
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """What is true of a frame.
+    """Trace linear albedo [h, w, 3], alpha [h, w], and bool [h, w]: facial skin, the head out of the sun's reach.
 
-    Parameters
-    ----------
-    head : with UVs, in metres
-    opaque : all that throws shadows, the head included
-    skin : of it, MAPS texels wide
-    view : the camera, in the head's axes
-    sun : [3], unit direction to it; None: there is no shadow
-    over : rays along a pixel's side
-
-    Returns
-    -------
-    Linear albedo [h, w, 3], alpha [h, w], and bool [h, w] each: facial skin, and the part of the head that the sun does
-    not reach.
+    opaque: all that casts shadows, the head included; skin: MAPS texels wide; view: in the head's axes; sun [3]: unit
+    direction to it, None for no shadow; over: rays along a pixel's side.
     """
     caster = raster.RayCaster(head)
     face, bary, _ = raster.render_view(caster, view, over)
-    uv = raster.interpolate(head.uvs, head.face_uvs, face, bary)
     hit = face >= 0
-    at = np.stack([uv[..., 0] * MAPS, (1 - uv[..., 1]) * MAPS], -1)[hit]
-    colour = np.zeros((*hit.shape, 3), np.float32)
-    colour[hit] = raster.sample(skin.diffuse, at)
+    uv = raster.interpolate(head.uvs, head.face_uvs, face, bary)[hit]
+    colour, in_face = np.zeros((*hit.shape, 3), np.float32), np.zeros(hit.shape, np.float32)
+    colour[hit], in_face[hit] = raster.sample_uv(skin.diffuse, uv), raster.sample_uv(template.mask("face", 1024), uv)
     cover = _shrunk(hit.astype(np.float32), over)
     albedo = _shrunk(colour, over) / np.maximum(cover, 1e-6)[..., None]
-    in_face = np.zeros(hit.shape, np.float32)
-    in_face[hit] = raster.sample(template.mask("face", 1024), at * 1024 / MAPS)
     points = raster.interpolate(head.vertices, head.faces, face, bary)
     normals = raster.interpolate(vertex_normals(head), head.faces, face, bary)
     dark = np.zeros(hit.shape, np.float32)
@@ -231,7 +155,7 @@ def trace_frame_truth(
 
 
 def write_video(path: Path, pictures: Iterable[np.ndarray], crf: int = 18) -> None:
-    """H.264 at scene.RATE and of quality `crf` from sRGB pictures [H, W, 3] of one size, atomically."""
+    """Write H.264 at scene.RATE and of quality `crf` from sRGB pictures [H, W, 3] of one size, atomically."""
     with replacing(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(scene.RATE), options={"crf": str(crf), "preset": "slow"})
         stream.pix_fmt = "yuv420p"
@@ -244,7 +168,7 @@ def write_video(path: Path, pictures: Iterable[np.ndarray], crf: int = 18) -> No
 
 
 def _shrunk(image: np.ndarray, factor: int) -> np.ndarray:
-    """The mean of each factor x factor block."""
+    """Average each factor x factor block."""
     return images.resize(image, image.shape[1] // factor, image.shape[0] // factor)
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What stands around a synthetic subject: a hand-held camera path, a sun behind leaves, a cluttered room without walls.
+"""The surroundings of a subject: a hand-held camera path, a sun behind leaves, a cluttered room without walls.
 
 World: metres, +Z up, the head's middle at the origin, its face towards -Y. The same numbers make the rendered video and
 its truth.
@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from core.geometry.meshes import Mesh
 
@@ -21,8 +22,7 @@ DISTANCE = 0.46  # metres from the camera to the head's middle
 
 @dataclass(frozen=True)
 class Sun:
-    """direction: unit vector towards the sun; strength: irradiance across the beam in W/m^2; angle: its diameter in
-    radians; colour: linear sRGB."""
+    """A sun: unit direction to it, irradiance across the beam in W/m^2, diameter in radians, linear sRGB colour."""
 
     direction: np.ndarray
     strength: float = 4.2
@@ -36,8 +36,7 @@ SKY = (0.42, 0.55, 0.80)
 
 @dataclass(frozen=True)
 class AreaLamp:
-    """A square area lamp that shines at the head: where it is [3] and its side in metres, its power in watts, its
-    colour in linear sRGB."""
+    """A square lamp that shines at the head: position [3] and side in metres, power in watts, linear sRGB colour."""
 
     position: tuple[float, float, float]
     size: float
@@ -47,9 +46,11 @@ class AreaLamp:
 
 @dataclass(frozen=True)
 class SceneLight:
-    """All that lights a subject. sky: its radiance everywhere, [3], or an equirectangular panorama [H, W, 3] as Blender
-    reads one (its middle column is +X); blockers: what stands between the lights and the head, unseen by the camera;
-    flash: watts of a small lamp in the camera's own place, that goes with it."""
+    """All light on a subject.
+
+    sky: its radiance everywhere, [3], or an equirectangular panorama [H, W, 3] as Blender reads one (its middle column
+    is +X); blockers of the light, unseen by the camera; flash: watts of a small lamp at the camera, which goes with it.
+    """
 
     sky: tuple[float, float, float] | np.ndarray = SKY
     sun: Sun | None = None
@@ -60,10 +61,12 @@ class SceneLight:
 
 @dataclass(frozen=True)
 class Shot:
-    """What is rendered of a scene, and how well. cameras [N, 4, 4]: camera to world; frames: numbers into them;
-    samples: of Cycles, a pixel; scale: of the pictures' size; poses [N, 4, 4]: where the head is in each frame, head to
-    world, None: still; room: whether there is anything behind the person; focal: factor on the focal length, for
-    close-ups."""
+    """The rendered part of a scene, and its quality.
+
+    cameras [N, 4, 4]: camera to world; frames: numbers into them; samples of Cycles per pixel; scale of the pictures'
+    size; poses [N, 4, 4]: head to world in each frame, None: still; room: True for a room behind the person; focal:
+    factor on the focal length, for close-ups.
+    """
 
     cameras: np.ndarray
     frames: Sequence[int]
@@ -75,30 +78,25 @@ class Shot:
 
 
 def sun_of(seed: int) -> Sun:
-    """High and to one side, in front of the face."""
+    """Draw a sun high and to one side, in front of the face."""
     rng = np.random.default_rng([seed, 20])
     azimuth, height = np.radians(rng.uniform(20, 50)) * rng.choice([-1, 1]), np.radians(rng.uniform(38, 52))
     return Sun(np.array([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)]))
 
 
-def strew_leaves(seed: int, sun: Sun, distance: float = 0.40, count: int = 28, reach: float = 0.15) -> Mesh:
-    """A loose twig between head and sun: pointed leaves 2.4 to 5.6 cm long, strewn over a disc across the beam.
+def strew_leaves(seed: int, sun: Sun) -> Mesh:
+    """Strew a loose twig between head and sun: pointed leaves 2.4 to 5.6 cm long over a disc across the beam.
 
-    Parameters
-    ----------
-    seed : of the twig
-    sun : whose beam it is
-    distance : from the head, in metres; at 0.4 the sun blurs their edges over 2 mm: hard shadows, as at noon under a
-        tree
-    count : of leaves
-    reach : radius of the disc, in metres
+    At 0.4 m from the head the sun blurs the edges over 2 mm: hard shadows, as at noon under a tree.
     """
     rng = np.random.default_rng([seed, 21])
-    side, up = _across(sun.direction)
+    side = np.cross(sun.direction, [0, 0, 1.0])
+    side /= np.linalg.norm(side)
+    up = np.cross(side, sun.direction)
     vertices, faces = [], []
-    for _ in range(count):
-        a, r = rng.uniform(0, 2 * np.pi), reach * np.sqrt(rng.uniform())
-        centre = sun.direction * (distance + rng.uniform(-0.06, 0.06)) + side * r * np.cos(a) + up * r * np.sin(a)
+    for _ in range(28):
+        a, r = rng.uniform(0, 2 * np.pi), 0.15 * np.sqrt(rng.uniform())
+        centre = sun.direction * (0.40 + rng.uniform(-0.06, 0.06)) + side * r * np.cos(a) + up * r * np.sin(a)
         turn, length, width = rng.uniform(0, 2 * np.pi), rng.uniform(0.012, 0.028), rng.uniform(0.004, 0.010)
         along, over = side * np.cos(turn) + up * np.sin(turn), up * np.cos(turn) - side * np.sin(turn)
         over = over + sun.direction * rng.uniform(-0.6, 0.6)
@@ -109,12 +107,15 @@ def strew_leaves(seed: int, sun: Sun, distance: float = 0.40, count: int = 28, r
     return Mesh(np.array(vertices), np.array(faces))
 
 
-def camera_path(seed: int, frames: int, degrees: float = 46) -> np.ndarray:
-    """Camera-to-world matrices [frames, 4, 4] (the camera looks along its -z, y up): past the nose from so many degrees
-    at one side to as many at the other, up and down on the way, with the slow drift and the tremble of a hand."""
+def camera_path(seed: int, frames: int) -> np.ndarray:
+    """Return camera-to-world matrices [frames, 4, 4] of a hand-held pass (the camera looks along its -z, y up).
+
+    Past the nose from 46 degrees at one side to as many at the other, up and down on the way, with the slow drift and
+    the tremble of a hand.
+    """
     rng = np.random.default_rng([seed, 22])
     t = np.linspace(0, 1, frames)
-    azimuth = np.radians(degrees) * (0.8 * (2 * t - 1) + 0.2 * np.sin(np.pi * (t - 0.5))) * rng.choice([-1, 1])
+    azimuth = np.radians(46) * (0.8 * (2 * t - 1) + 0.2 * np.sin(np.pi * (t - 0.5))) * rng.choice([-1, 1])
     height = np.radians(7 + 13 * np.sin(2 * np.pi * (1.5 * t + 0.1)))
     distance = DISTANCE * (1 + 0.05 * np.sin(2 * np.pi * (1.2 * t + rng.uniform())))
     direction = np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)
@@ -125,8 +126,10 @@ def camera_path(seed: int, frames: int, degrees: float = 46) -> np.ndarray:
 
 
 def rig() -> np.ndarray:
-    """Camera-to-world matrices [16, 4, 4] of a studio: two fixed rows of eight cameras, over 100 degrees from side to
-    side, as in multi-view face datasets."""
+    """Return the camera-to-world matrices [16, 4, 4] of a studio.
+
+    Two fixed rows of eight cameras, over 100 degrees from side to side, as in multi-view face datasets.
+    """
     height, azimuth = (np.radians(a).ravel() for a in np.meshgrid([-6.0, 22.0], np.linspace(-50, 50, 8), indexing="ij"))
     direction = np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)
     position = DISTANCE * direction
@@ -134,8 +137,10 @@ def rig() -> np.ndarray:
 
 
 def looking(position: np.ndarray, target: np.ndarray, roll: np.ndarray) -> np.ndarray:
-    """Camera-to-world matrices [N, 4, 4] of cameras at `position` [N, 3] that look at `target` [N, 3], turned about
-    their axis by `roll` [N] radians."""
+    """Return camera-to-world matrices [N, 4, 4] of cameras at `position` [N, 3] that look at `target` [N, 3].
+
+    They are turned about their axis by `roll` [N] radians.
+    """
     back = position - target
     back /= np.linalg.norm(back, axis=1, keepdims=True)
     right = np.cross([0, 0, 1.0], back)
@@ -149,15 +154,6 @@ def looking(position: np.ndarray, target: np.ndarray, roll: np.ndarray) -> np.nd
 
 
 def _drift(rng: np.random.Generator, frames: int, size: float, period: float) -> np.ndarray:
-    """Smooth random motion [frames, 3] of deviation `size`, correlated over `period` frames."""
-    from scipy.ndimage import gaussian_filter1d
-
+    """Draw smooth motion [frames, 3] of deviation `size`, correlated over `period` frames."""
     noise = gaussian_filter1d(rng.normal(size=(frames + 40, 3)), period, axis=0)[20:-20]
     return size * noise / noise.std()
-
-
-def _across(direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors perpendicular to a unit vector and to each other."""
-    side = np.cross(direction, [0, 0, 1.0])
-    side /= np.linalg.norm(side)
-    return side, np.cross(side, direction)

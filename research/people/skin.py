@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A procedural skin with known truth in the template's UV layout: a seed goes in, diffuse albedo, specular albedo,
-height and normals come out.
+"""A procedural skin of known truth in the template's UV layout: a seed gives albedos, height and normals.
 
 The colour is that of melanin and blood (pigment.py), varied over regions, blotches, mottling and marks; pores, creases,
 moles and hairs act on colour, gloss and height together, as they do on a face.
@@ -16,20 +15,22 @@ import numpy as np
 from core.geometry.noise import noise, octaves
 
 from . import adornment, hairs, pigment
-from .canvas import Canvas, canvas
+from .canvas import Canvas, canvas, relief_normals
 from .parameters import SkinParameters, sample_parameters
 from .regions import creases, lid_lines, regions
-from .relief import normals
-from .spots import splat_patches, splat_spots, strew
+from .spots import splat_moles, splat_spots, strew
 
 GROUND = 512  # size of the canvas on which marks are strewn, whatever the size of the maps
 
 
 @dataclass(frozen=True)
 class Skin:
-    """All float32. diffuse [S, S, 3]: albedo, linear sRGB; specular [S, S]: Principled BSDF's Specular IOR Level (0.35
-    is the 2.8 % of skin); height [S, S] in mm over the smooth head; normal [S, S, 3]: unit, tangent space, OpenGL Y+
-    (not packed into [0, 1]); covered bool [S, S]: texels of the head (the rest is bled)."""
+    """Maps of a skin, float32.
+
+    diffuse [S, S, 3]: albedo, linear sRGB; specular [S, S]: Principled BSDF's Specular IOR Level (0.35 is the 2.8 % of
+    skin); height [S, S] in mm over the smooth head; normal [S, S, 3]: unit, tangent space, OpenGL Y+ (not packed into
+    [0, 1]); covered bool [S, S]: texels of the head (the rest is bled).
+    """
 
     diffuse: np.ndarray
     specular: np.ndarray
@@ -39,11 +40,9 @@ class Skin:
 
 
 def make_skin(parameters: SkinParameters | int, size: int = 1024) -> Skin:
-    """The skin of these parameters, or of those that a seed stands for. The same parameters and size give the same
-    bytes."""
-    if not isinstance(parameters, SkinParameters):
-        parameters = sample_parameters(parameters)
-    return paint_skin(parameters, canvas(size), canvas(GROUND))
+    """Make the skin of parameters or of a seed; the same parameters and size give the same bytes."""
+    subject = parameters if isinstance(parameters, SkinParameters) else sample_parameters(parameters)
+    return paint_skin(subject, canvas(size), canvas(GROUND))
 
 
 def paint_skin(
@@ -53,54 +52,43 @@ def paint_skin(
     traits: tuple[np.ndarray, np.ndarray] | None = None,
     hair: bool = True,
 ) -> Skin:
-    """`make_skin` on any canvas.
+    """Make a skin on any canvas.
 
-    Parameters
-    ----------
-    parameters : of the subject
-    on : what is painted on
-    ground : of the same head, GROUND texels wide, where marks are strewn
-    traits : added to the logarithms of melanin and of blood, [N] each
-    hair : whether brows, lashes, beard and scalp are painted
+    Marks are strewn on `ground`, of the same head, GROUND texels wide; traits ([N], [N]) are added to the logarithms of
+    melanin and of blood; hair: paint brows, lashes, beard and scalp.
     """
-    area = regions(on)
-    melanin, blood = _pigments(parameters, on, area)
+    p, area = parameters, regions(on)
+    melanin, blood = _pigments(p, on, area)
     if traits is not None:
         melanin, blood = melanin * np.exp(traits[0]), blood * np.exp(traits[1])
-    height, hollow, dry = _relief(parameters, on, ground, area)
-    blood = blood * np.exp(0.12 * hollow)
-    melanin = melanin * np.exp(0.20 * _contrast(parameters) * hollow)
-    stain, dome = _marks(parameters, on, ground)
-    melanin = melanin * np.exp(stain)
-    height = height + dome
-    p = parameters
+    height, hollow, dry = _relief(p, on, ground, area)
+    melanin, blood = melanin * np.exp(0.20 * _contrast(p) * hollow), blood * np.exp(0.12 * hollow)
+    stain, dome = _marks(p, on, ground)
+    melanin, height = melanin * np.exp(stain), height + dome
     scar = adornment.paint_scars(on, ground, p.scars, np.random.default_rng([p.adorn_seed, 10]))
     melanin, blood, height = melanin * np.exp(scar.stain), blood * np.exp(scar.flush), height + scar.ridge
 
     diffuse = pigment.reflectance(melanin, blood, p.oxygen, p.scattering, p.slope, p.chroma)
     diffuse = diffuse * (1 - 0.07 * np.clip(hollow, 0, 1))[:, None]
-    diffuse = adornment.put_on_make_up(
-        diffuse, area, adornment.lid_distance(on), p.make_up, np.random.default_rng([p.adorn_seed, 11])
-    )
-    specular = _specular(parameters, on, area, hollow, dry)
+    diffuse = adornment.put_on_make_up(diffuse, on, p.make_up, np.random.default_rng([p.adorn_seed, 11]))
+    specular = _specular(p, on, area, hollow, dry)
     if hair:
-        cover, diffuse = _hair(parameters, on, ground, area, diffuse)
+        cover, diffuse = _hair(p, on, ground, area, diffuse)
         specular, height = specular * (1 - 0.55 * cover), height + 0.05 * cover
     return Skin(
         on.spread(np.clip(diffuse, 0, 1)),
         on.spread(specular),
         on.spread(height.astype(np.float32)),
-        on.spread(normals(height, on)),
+        on.spread(relief_normals(height, on)),
         on.covered,
     )
 
 
 def _pigments(p: SkinParameters, on: Canvas, area: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Melanin and blood fractions [N] from tone, regions and variation at all scales, without marks."""
+    """Return melanin and blood fractions [N] from tone, regions and variation at all scales, without marks."""
     rng = np.random.default_rng([p.tone_seed, 1])
-    flush = p.redness
     blood = (
-        flush
+        p.redness
         * (
             0.55 * area["cheeks"]
             + 0.70 * area["nose"]
@@ -140,16 +128,14 @@ def _pigments(p: SkinParameters, on: Canvas, area: dict[str, np.ndarray]) -> tup
 
 
 def _contrast(p: SkinParameters) -> float:
-    """The darker the skin, the more one percent of melanin darkens it: a factor on its relative variation that keeps
-    the visible one alike."""
+    """Return the factor on melanin's relative variation that keeps the visible one alike on all tones."""
     return (0.05 / (p.melanin + 0.02)) ** 0.4
 
 
 def _relief(
     p: SkinParameters, on: Canvas, ground: Canvas, area: dict[str, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Height [N] in mm, how deep in a pore or crease each texel lies [N] in [0, 1.5], and how rough it is [N] of
-    deviation 1."""
+    """Return height [N] in mm, depth [N] in [0, 1.5] in a pore or crease, and roughness [N] of deviation 1."""
     rng = np.random.default_rng([p.pore_seed, 2])
     here, age = regions(ground), np.clip((p.age - 20) / 50, 0, 1)
     density = (
@@ -182,7 +168,7 @@ def _relief(
 
 
 def _lip_lines(on: Canvas, lips: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The lips' vertical creases [N] in [0, 1]: ridged noise drawn out along the way in and out of the mouth."""
+    """Return the lips' vertical creases [N] in [0, 1]: ridged noise stretched along the way in and out of the mouth."""
     lines, there = np.zeros_like(lips), lips > 0.01
     squeezed = on.position[there] * np.float32([1.0, 0.28, 0.28])
     ridge = 1 - np.minimum(1, 1.4 * np.abs(octaves(squeezed, [1.5, 2.6], rng)))
@@ -191,31 +177,26 @@ def _lip_lines(on: Canvas, lips: np.ndarray, rng: np.random.Generator) -> np.nda
 
 
 def _marks(p: SkinParameters, on: Canvas, ground: Canvas) -> tuple[np.ndarray, np.ndarray]:
-    """Freckles and moles: what they add to the logarithm of melanin, and to the height in mm, [N] each."""
+    """Return the effect [N] of freckles and moles on the logarithm of melanin, and on height in mm."""
     rng, here = np.random.default_rng([p.mole_seed, 3]), regions(ground)
     room = here["bald"] * (1 - here["ears"])
     sunny = np.clip(here["cheeks"] + here["nose"] + 0.35 * here["forehead"] + 0.05, 0, 1)
     points, _ = strew(ground, 0.22 * p.freckles * sunny * room, rng)
-    freckles = splat_spots(
-        on,
-        points,
-        rng.lognormal(np.log(0.40), 0.35, len(points)),
-        p.freckle_contrast * _contrast(p) * rng.uniform(0.3, 1.0, len(points)),
-    )
+    radius = rng.lognormal(np.log(0.40), 0.35, len(points))
+    freckles = splat_spots(on, points, radius, p.freckle_contrast * _contrast(p) * rng.uniform(0.3, 1.0, len(points)))
     points, _ = strew(ground, p.moles * room / float((ground.area * room).sum()), rng)
     radius = np.clip(rng.lognormal(np.log(0.75), 0.45, len(points)), 0.4, 2.5)
     # a dark stain needs more melanin on light skin; raised ones are often paler
     raised = (rng.random(len(points)) < 0.4) * np.minimum(radius, 1.5) * rng.uniform(0.15, 0.45, len(points))
     strength = rng.uniform(0.45, 1.0, len(points)) * np.log(0.55 / np.minimum(p.melanin, 0.4))
-    stain, _ = splat_patches(on, points, radius, strength, rng)
-    _, dome = splat_patches(on, points, radius, raised, rng)
+    stain, dome = splat_moles(on, points, radius, strength, raised, rng)
     return np.maximum(freckles, stain), dome
 
 
 def _hair(
     p: SkinParameters, on: Canvas, ground: Canvas, area: dict[str, np.ndarray], diffuse: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Cover of all hair [N], and the diffuse albedo with it."""
+    """Return the cover [N] of all hair, and the diffuse albedo with it."""
     rng, here = np.random.default_rng([p.hair_seed, 4]), regions(ground)
     colour, brow_colour = np.asarray(p.hair_colour, np.float32), np.asarray(p.brow_colour, np.float32)
     eyebrow = hairs.grow_brows(on, ground, here["brows"], p.brow_density, rng)

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Round things on the skin: pores, freckles, moles. Strewn over the surface by a density per mm^2, then splatted to the
-texels near them."""
+"""Pores, freckles and moles, strewn by a density per mm^2 and splatted to the texels near them."""
 
 from __future__ import annotations
 
@@ -13,10 +12,9 @@ from .canvas import Canvas
 
 
 def strew(ground: Canvas, density: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Random points of the surface, float32 [M, 3] in mm, and the ground's texel under each, int [M].
+    """Draw random surface points, float32 [M, 3] in mm, and the ground's texel under each, int [M].
 
-    `density` [N] in points per mm^2, on `ground`: one canvas for all sizes, so that a subject's marks stay where they
-    are at any size.
+    `density` [N] is in points per mm^2 on `ground`: one canvas for all sizes, so that marks stay in place at any size.
     """
     expected = np.cumsum(np.asarray(density, np.float64) * ground.area)
     texel = np.searchsorted(expected, rng.uniform(0, expected[-1], rng.poisson(expected[-1])), side="right")
@@ -31,69 +29,39 @@ def strew(ground: Canvas, density: np.ndarray, rng: np.random.Generator) -> tupl
     return here + (steps * share).sum(1), texel
 
 
-def splat_spots(
-    on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray, blend=np.maximum
-) -> np.ndarray:
-    """Bell-shaped spots. A radius below the texel's size becomes the texel's size, with the strength lowered by the
-    same share of area.
+def splat_spots(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray) -> np.ndarray:
+    """Draw bell-shaped spots, float32 [N]; the strongest counts where they overlap.
 
-    Parameters
-    ----------
-    on : what they lie on
-    points : [M, 3], in mm
-    radius : [M], in mm; they end at twice that
-    strength : [M], in the middle
-    blend : ufunc, where they overlap
-
-    Returns
-    -------
-    float32 [N].
+    points [M, 3] and radius [M] in mm, spots end at twice that; strength [M] in the middle. A radius below the texel's
+    size becomes that size, and the strength is lowered by the same share of area.
     """
     out = np.zeros(len(on.position), np.float32)
-    if len(points):
-        finest = 0.6 * on.texel_mm
-        wide = np.maximum(radius, finest)
-        texel, point, distance = on.near(points, 2 * wide)
-        bell = (1 - (distance / (2 * wide[point])) ** 2) ** 2
-        blend.at(out, texel, (bell * (strength * (radius / wide) ** 2)[point]).astype(np.float32))
+    wide = np.maximum(radius, 0.6 * on.texel_mm)
+    texel, point, distance = on.near(points, 2 * wide)
+    bell = (1 - (distance / (2 * wide[point])) ** 2) ** 2
+    np.maximum.at(out, texel, (bell * (strength * (radius / wide) ** 2)[point]).astype(np.float32))
     return out
 
 
-def splat_patches(
+def splat_moles(
     on: Canvas,
     points: np.ndarray,
     radius: np.ndarray,
-    strength: np.ndarray,
+    darkness: np.ndarray,
+    height: np.ndarray,
     rng: np.random.Generator,
-    ragged: float = 0.25,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Flat spots with a ragged edge (a mole's stain), and their dome.
+    """Draw flat stains with a ragged edge, and domes, float32 [N] each.
 
-    Parameters
-    ----------
-    on : what they lie on
-    points : [M, 3], in mm
-    radius : [M], in mm
-    strength : [M], from 0
-    rng : of the edge and the grain
-    ragged : twice the deviation of the edge, in radii
-
-    Returns
-    -------
-    Stain and dome, float32 [N] each: the strength in the middle, that of the stain within its grain.
+    points [M, 3] and radius [M] in mm; darkness of the stains, within their grain, and height of the domes in the
+    middle, [M].
     """
-    stain, dome = np.zeros(len(on.position), np.float32), np.zeros(len(on.position), np.float32)
-    if len(points):
-        texel, point, distance = on.near(points, radius * 1.6 + 0.3)
-        edge = noise(on.position[texel], 1.3, rng, smooth=True) if len(texel) else np.zeros(0)
-        inward = 1 - distance / radius[point] + ragged * 0.5 * edge
-        softness = 0.25 + 0.25 / np.maximum(radius[point], 0.3)
-        np.maximum.at(
-            stain,
-            texel,
-            (strength[point] * np.clip(inward / softness + 0.3, 0, 1) * (1 + 0.12 * edge)).astype(np.float32),
-        )
-        np.maximum.at(
-            dome, texel, (strength[point] * np.clip(1 - (distance / radius[point]) ** 2, 0, 1)).astype(np.float32)
-        )
+    stain, dome = np.zeros((2, len(on.position)), np.float32)
+    texel, point, distance = on.near(points, radius * 1.6 + 0.3)
+    edge = noise(on.position[texel], 1.3, rng, smooth=True) if len(texel) else np.zeros(0)
+    softness = 0.25 + 0.25 / np.maximum(radius[point], 0.3)
+    inward = np.clip((1 - distance / radius[point] + 0.125 * edge) / softness + 0.3, 0, 1)
+    np.maximum.at(stain, texel, (darkness[point] * inward * (1 + 0.12 * edge)).astype(np.float32))
+    bow = np.clip(1 - (distance / radius[point]) ** 2, 0, 1)
+    np.maximum.at(dome, texel, (height[point] * bow).astype(np.float32))
     return stain, dome

@@ -53,16 +53,6 @@ def test_a_sphere_shades_a_disc_of_its_size_where_the_sun_says_so():
     assert np.isclose(area, np.pi * (half / 4) ** 2 / 0.8, rtol=0.05)  # the disc seen obliquely
 
 
-def test_a_larger_sun_softens_the_shadow_s_edge():
-    sun = np.array([0.6, 0, 0.8])
-    suns = [light.SkyAndSun(WHITE_SKY, sun, np.ones(3), radius) for radius in (0.002, 0.15)]
-    soft = [
-        ((s > 0.01) & (s < 0.99)).mean()
-        for s in (light.bake(floor(0.1, 0.08), 96, each, "self", np.random.default_rng(0))[1] for each in suns)
-    ]
-    assert soft[1] > 3 * soft[0]
-
-
 def test_a_heads_light_is_the_sky_s_and_what_is_left_of_the_sun_s():
     rng = np.random.default_rng([3, 7])
     drawn, inside = light.random_light(rng), raster.rasterize_uv(template.load(), 128)[0] >= 0

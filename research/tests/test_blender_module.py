@@ -27,12 +27,10 @@ def test_the_extension_is_enabled_without_a_word_of_numpys():
     assert "NumPy" not in ran.stderr and "Traceback" not in ran.stderr, ran.stderr
 
 
-@pytest.mark.parametrize("renderer", ["research.people.render", "research.people.lifelike.render"])
-def test_subjects_are_rendered_without_a_word_of_numpys(renderer):
+def test_subjects_are_rendered_without_a_word_of_numpys():
     pytest.importorskip("bpy")
-    ran = subprocess.run(
-        [sys.executable, "-c", f"import os, {renderer}; os._exit(0)"], capture_output=True, text=True, cwd=ROOT
-    )
+    command = [sys.executable, "-c", "import os, research.people.render; os._exit(0)"]
+    ran = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
     assert ran.returncode == 0 and not ran.stderr, ran.stderr
 
 

@@ -18,6 +18,7 @@ from research.people import sample, scene  # noqa: E402
 from research.people.canvas import canvas  # noqa: E402
 from research.people.identities import reserved_seeds, subject_mesh  # noqa: E402
 from research.people.lifelike import clothes, eyes, facekit, figure, person, shape, traits, truth  # noqa: E402
+from research.people.regions import regions  # noqa: E402
 
 SEED = 3  # a man with cropped hair, a full beard and open eyes
 SIZE = 256
@@ -45,27 +46,16 @@ def seen(ready):
 
 
 def test_the_identity_basis_leaves_two_millimetres_of_a_person():
-    """The best rigid motion, scale and identity together; a bald subject is left without a residual. A good part
-    differs between left and right."""
-    rest = template.load().vertices
+    """Beyond the best rigid motion, scale and identity together, in good part asymmetric, without folds."""
+    template_head, rest = template.load(), template.load().vertices
     mirror = strands.cKDTree(rest).query(rest * [-1, 1, 1])[1]
-    for seed in (1, 2, 910001, 910003, 910004, 910006):
-        left = shape.unexplained(shape.person_mesh(seed).vertices - rest)
+    for seed in (1, 910001, 910003):
+        head = shape.person_mesh(seed)
+        left = shape.unexplained(head.vertices - rest)
         assert 0.002 < shape.root_mean_square(left) < 0.0024
         assert 0.0008 < shape.root_mean_square((left - left[mirror] * [-1, 1, 1]) / 2) < 0.002
+        assert np.quantile((vertex_normals(head) * vertex_normals(template_head)).sum(1), 0.02) > 0.6
     assert shape.root_mean_square(shape.unexplained(subject_mesh(1).vertices - rest)) < 1e-6
-
-
-def test_a_person_is_not_symmetric_and_not_a_caricature():
-    rest, moved = template.load(), shape.person_mesh(4)
-    mirror = np.linalg.norm(
-        rest.vertices[:, None, [0, 2]][::400] * [-1, 1] - rest.vertices[None][..., [0, 2]], axis=-1
-    ).argmin(1)
-    left, right = moved.vertices[::400] - rest.vertices[::400], moved.vertices[mirror] - rest.vertices[mirror]
-    assert 0.0002 < np.abs(left[:, 1] - right[:, 1]).mean() < 0.006
-    assert shape.root_mean_square(moved.vertices - rest.vertices) < 0.012
-    turned = (vertex_normals(moved) * vertex_normals(rest)).sum(1)
-    assert np.quantile(turned, 0.02) > 0.6, "no folds"
 
 
 def test_ict_facekit_changes_the_shape_where_it_is_given():
@@ -114,9 +104,15 @@ def test_an_eye_is_dark_in_the_middle_coloured_around_it_and_white_outside():
 
 def test_pigment_traits_are_mostly_alike_on_both_sides():
     on = canvas(SIZE)
+    skin = on.spread(regions(on)["bald"])
     for seed in (1, 2):
         for field in traits.broad_traits(person.sample_person(seed), on):
-            assert field.std() > 0.01 and 0.84 < traits.symmetry(field, on) < 0.96
+            picture = on.spread(field)
+            even, odd = (
+                np.average((half - np.average(half, weights=skin)) ** 2, weights=skin)
+                for half in (picture + picture[:, ::-1], picture - picture[:, ::-1])
+            )
+            assert field.std() > 0.01 and 0.84 < even / (even + odd) < 0.96
 
 
 def test_hair_grows_from_the_skin_and_not_into_the_head(someone):
@@ -128,44 +124,13 @@ def test_hair_grows_from_the_skin_and_not_into_the_head(someone):
             assert (skin.height(growth.points[:, 2:].reshape(-1, 3))[0] > -0.001).mean() > 0.98, growth.part
 
 
-def test_each_growth_is_where_its_part_of_the_map_is(someone):
-    on = canvas(SIZE)
-    assert set(someone.growth) == {"brows", "beard", "hair"}
-    for part, growth in ((growth.part, growth) for growth in someone.strands if growth.part in someone.growth):
-        _, texel = strands.cKDTree(someone.head.vertices).query(growth.points[::50, 0])
-        rest = 1000 * template.load().vertices[texel]
-        density = someone.growth[part][on.covered][on.tree.query(rest)[1]]
-        assert (density > 0.02).mean() > 0.9, part
-
-
-def test_prisms_have_the_hairs_radius_and_their_order():
-    straight = strands.Strands(
-        np.linspace([0, 0, 0], [0, 0, 0.01], 5, dtype=np.float32)[None] + np.float32([[[0, 0, 0]], [[0.1, 0, 0]]]),
-        np.full(2, 1e-4, np.float32),
-        np.zeros((2, 3), np.float32),
-        "hair",
-    )
-    mesh = strands.prisms(straight)
-    assert len(mesh.faces) == 2 * 6 * 4
-    reach = np.linalg.norm(mesh.vertices[:3, :2], axis=1), np.linalg.norm(mesh.vertices[12:15, :2], axis=1)
-    assert reach[0] == pytest.approx(1e-4, rel=1e-3) and reach[1] == pytest.approx(1e-4 / 3, rel=1e-3)
-    assert (mesh.vertices[mesh.faces[len(mesh.faces) // 2 :]][..., 0] > 0.05).all()
-
-
 def test_parts_cover_what_is_seen_once(seen):
     assert np.allclose(seen.parts.sum(-1), seen.alpha, atol=1e-5)
+    bare, beard = seen.parts[..., 0] > 0.99, seen.parts[..., figure.PARTS.index("beard")] > 0.9
+    assert np.abs(seen.seen - seen.bare)[bare].mean() < 0.01 and seen.bare[beard].mean() > 1.5 * seen.seen[beard].mean()
     shares = dict(zip(figure.PARTS, seen.parts.sum((0, 1)) / seen.alpha.sum(), strict=True))
-    assert all(
-        shares[part] > least
-        for part, least in (
-            ("skin", 0.1),
-            ("brows", 5e-4),
-            ("beard", 5e-3),
-            ("hair", 0.02),
-            ("eyes", 5e-4),
-            ("clothes", 0.1),
-        )
-    )
+    least = {"skin": 0.1, "brows": 5e-4, "beard": 5e-3, "hair": 0.02, "eyes": 5e-4, "clothes": 0.1}
+    assert all(shares[part] > share for part, share in least.items())
 
 
 def test_no_hair_hangs_before_the_face_or_flies():
@@ -183,34 +148,18 @@ def test_no_hair_hangs_before_the_face_or_flies():
 
 
 def test_a_shirt_ends_above_the_cut_of_the_neck_and_around_it():
-    for seed, collar in ((910003, "v"), (910006, "crew"), (7, "v")):
-        head = shape.person_mesh(seed)
-        cloth = clothes.shirt(replace(person.sample_person(seed), collar=collar), head)
+    head = shape.person_mesh(910003)
+    edges = np.sort(head.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), 1)
+    pairs, count = np.unique(edges, axis=0, return_counts=True)
+    cut = head.vertices[np.unique(pairs[count == 1])]
+    for collar in ("v", "crew"):
+        cloth = clothes.shirt(replace(person.sample_person(910003), collar=collar), head)
         edge = cloth.vertices.reshape(clothes.ROWS, clothes.AROUND, 3)[:12]
         top = edge[np.argmax(edge[..., 2], 0), np.arange(clothes.AROUND)]
-        pairs, count = np.unique(
-            np.sort(head.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), 1), axis=0, return_counts=True
-        )
-        cut = head.vertices[np.unique(pairs[count == 1])]
         near = strands.cKDTree(top[:, :2]).query(cut[:, :2])[1]
         assert (top[near, 2] > cut[:, 2] + 0.003).all(), "no hole"
         nearest = strands.cKDTree(cut[:, :2]).query(top[:, :2])[1]
         assert np.quantile(np.linalg.norm(top[:, :2] - cut[nearest, :2], axis=1), 0.9) < 0.03
-
-
-def test_hair_is_in_what_is_seen_and_not_in_the_bare_skin(someone, seen):
-    beard = seen.parts[..., figure.PARTS.index("beard")] > 0.9
-    assert beard.sum() > 20
-    hair = np.mean(next(growth.colour for growth in someone.strands if growth.part == "beard"))
-    haired = seen.seen[beard].mean()
-    assert haired == pytest.approx(hair, rel=0.4) and seen.bare[beard].mean() > 1.5 * haired
-    clear = seen.parts[..., 0] > 0.99
-    assert np.abs(seen.seen - seen.bare)[clear].mean() < 0.01
-
-
-def test_a_sun_behind_the_head_reaches_no_face(ready):
-    night, day = (truth.trace_truth(ready, view(0.1), np.array([0, y, 0.0]), over=1) for y in (1.0, -1.0))
-    assert night.shadow[night.face].mean() > 0.9 > 0.5 > day.shadow[day.face].mean()
 
 
 def test_the_shadow_of_what_stands_still_moves_over_a_head_that_sways(someone):
@@ -240,12 +189,10 @@ def test_a_seed_is_one_person(someone):
     assert person.sample_person(SEED) == someone.person != person.sample_person(SEED + 1)
     assert np.array_equal(shape.person_mesh(SEED).vertices, someone.head.vertices)
     assert np.array_equal(figure.paint(someone.person, SIZE)[1], someone.seen)
-    shaven = figure.grow_hair(
-        replace(someone.person, beard="none", hair="none"), someone.head, someone.opened, someone.shirt
-    )
-    assert all(np.array_equal(a.points, b.points) for a, b in zip(shaven, someone.strands, strict=False)), (
-        "each growth has a stream of its own"
-    )
+    shaven = replace(someone.person, beard="none", hair="none")
+    grown = figure.grow_hair(shaven, someone.head, someone.opened, someone.shirt)
+    # each growth has a stream of its own
+    assert all(np.array_equal(a.points, b.points) for a, b in zip(grown, someone.strands, strict=False))
 
 
 def test_training_never_draws_a_person_who_is_filmed():

@@ -3,7 +3,7 @@
 """The people that a delighter learns from: their light must know nothing of what grows on them or of what colour they
 are."""
 
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -47,14 +47,9 @@ def contrast(picture: np.ndarray, stage: relightable.RelightableView) -> float:
 def test_a_sight_comes_back_as_it_was_kept(stage, tmp_path):
     relightable.save(tmp_path / "0.npz", stage)
     back = relightable.load(tmp_path / "0.npz")
-    assert all(
-        np.array_equal(getattr(stage, f.name), getattr(back, f.name))
-        for f in fields(relightable.RelightableView)
-        if f.name != "unlit"
-    )
-    assert all(
-        np.array_equal(getattr(stage.unlit, f.name), getattr(back.unlit, f.name)) for f in fields(relightable.Unlit)
-    )
+    for one, other in ((stage, back), (stage.unlit, back.unlit)):
+        names = [field.name for field in fields(one) if field.name != "unlit"]
+        assert all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)
 
 
 def test_light_does_not_know_the_pigment(stage):
@@ -83,19 +78,9 @@ def test_brows_and_beard_are_lit_as_the_bare_head_is(stage):
         made = portraits.portray(stage, colours, np.random.default_rng(seed))
         grown = (share(stage, "brows") + share(stage, "beard") > 0.9) & stage.here & (made.head > 0.99)
         slopes = np.abs(np.diff(np.log(np.maximum(made.even.mean(-1), 0.02)), axis=1))[:, :-1][grown[:, 1:-1]]
-        strands = np.abs(np.diff(np.log(np.maximum(made.shading.mean(-1), 0.02)), axis=1))[:, :-1][grown[:, 1:-1]]
+        shading = images.srgb_to_linear(made.srgb).mean(-1) / np.maximum(made.albedo.mean(-1), 0.004)
+        strands = np.abs(np.diff(np.log(np.maximum(shading, 0.02)), axis=1))[:, :-1][grown[:, 1:-1]]
         assert np.median(slopes) < 0.5 * np.median(strands)  # no strand is seen in it
-
-
-def test_a_lamp_that_is_blocked_everywhere_lights_nothing(stage):
-    dark = replace(stage, unlit=replace(stage.unlit, reach=0 * stage.unlit.reach), reach=0 * stage.reach)
-    colours = portraits.colours_of(stage, np.random.default_rng(2))
-    for seed in range(20):
-        made = portraits.portray(dark, colours, np.random.default_rng(seed))
-        if made.strong > 0.4:
-            assert made.shadow[stage.here].min() > 0.999
-            return
-    pytest.fail("no light was strong in twenty draws")
 
 
 def test_batches_show_each_sight_under_two_lights_and_depend_on_the_seed_alone(tmp_path):
@@ -164,16 +149,12 @@ def test_a_face_that_is_painted_over_keeps_its_light():
     assert moved > 0.3
 
 
-@pytest.mark.parametrize("softest_dye, dyes", [(0.0, 0), (0.3, None), (9.0, 40)])
-def test_stains_up_to_a_hardness_are_dyes(monkeypatch, softest_dye, dyes):
+def test_stains_with_a_hard_edge_are_dyes():
     """A grey patch with a hard edge is what a leaf's shadow looks like; a dye leaves one channel as it is."""
-    monkeypatch.setattr(markings, "HARD", softest_dye)
-    found, steps = [], []
+    dyes, steps = [], []
     for seed in range(40):
         log = np.abs(markings.stains(256, np.random.default_rng(seed)))
-        found.append(log.max((0, 1)).min() == 0)
+        dyes.append(log.max((0, 1)).min() == 0)
         steps.append(np.abs(np.diff(log, axis=0)).max() / log.max())
-    if dyes is None:
-        assert np.median(np.array(steps)[found]) > 1.5 * np.median(np.array(steps)[np.logical_not(found)])
-    else:
-        assert sum(found) == dyes
+    dyes, steps = np.array(dyes), np.array(steps)
+    assert 0 < dyes.sum() < 40 and np.median(steps[dyes]) > 1.5 * np.median(steps[~dyes])

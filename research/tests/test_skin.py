@@ -10,9 +10,7 @@ import pytest
 from core.face import template
 from core.geometry.meshes import Mesh
 from research.people import pigment
-from research.people.canvas import canvas, make_canvas
-from research.people.regions import regions
-from research.people.relief import normals
+from research.people.canvas import canvas, make_canvas, relief_normals
 from research.people.skin import GROUND, SkinParameters, make_skin, paint_skin, sample_parameters
 
 SIZE = 256
@@ -24,29 +22,19 @@ def plain():
     return make_skin(PLAIN, SIZE)
 
 
-def test_more_melanin_darkens_every_channel():
+def test_melanin_darkens_every_channel_and_blood_green_before_red():
     rgb = pigment.reflectance(np.geomspace(0.005, 0.6, 60), np.full(60, 0.015))
-    assert (np.diff(rgb, axis=0) < 0).all()
+    assert (np.diff(rgb, axis=0) < 0).all() and (np.diff(pigment.typology_angle(rgb)) < 0).all()
     assert 0.02 < rgb.min(-1)[0] and rgb[0, 0] > 0.6 and rgb[-1].max() < 0.1  # very light ... very dark
-
-
-def test_more_blood_takes_green_before_red():
-    rgb = pigment.reflectance(np.full(2, 0.02), np.array([0.005, 0.05]))
-    loss = rgb[1] / rgb[0]
-    assert loss[1] < 0.75 * loss[0] and (loss < 1).all()
-
-
-def test_white_paint_is_white_and_the_typology_angle_orders_tones():
-    assert np.allclose(pigment._integrate(np.full((1, 31), 0.5)), 0.5, atol=1e-6)
-    angles = pigment.typology_angle(pigment.reflectance(np.array([0.01, 0.08, 0.4]), np.full(3, 0.015)))
-    assert angles[0] > 45 > angles[1] > 0 > angles[2]
+    pale, flushed = pigment.reflectance(np.full(2, 0.02), np.array([0.005, 0.05]))
+    assert (flushed < pale).all() and flushed[1] / pale[1] < 0.75 * flushed[0] / pale[0]
+    assert np.allclose(pigment._integrate(np.full((1, 31), 0.5)), 0.5, atol=1e-6)  # white paint is white
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(plain):
     again = make_skin(PLAIN, SIZE)
     for name in ("diffuse", "specular", "height", "normal"):
         assert getattr(plain, name).tobytes() == getattr(again, name).tobytes(), name
-        assert getattr(plain, name).dtype == np.float32
     assert not np.allclose(make_skin(replace(PLAIN, tone_seed=1), SIZE).diffuse, plain.diffuse, atol=0.01)
 
 
@@ -61,8 +49,7 @@ def test_a_mole_seed_moves_moles_and_nothing_else(plain):
 
 
 def test_every_subject_is_plausible():
-    angles = []
-    for seed in range(5):
+    for seed in range(3):
         skin = make_skin(seed, 128)
         inside = skin.diffuse[skin.covered]
         assert 0.01 < inside.mean() < 0.9 and inside.min() > 0 and inside.max() < 1
@@ -76,27 +63,6 @@ def test_every_subject_is_plausible():
     angles = [angle(sample_parameters(seed)) for seed in range(200)]
     counts, _ = np.histogram(angles, [-60, -30, 10, 28, 41, 55, 70])  # the six classes of skin colour
     assert (counts > 5).all(), counts
-
-
-@pytest.mark.parametrize("melanin", [0.02, 0.3])
-def test_lips_are_redder_than_cheeks_and_glossier(melanin):
-    parameters = replace(PLAIN, melanin=melanin, lip_melanin=0.85)
-    skin, on = make_skin(parameters, SIZE), canvas(SIZE)
-    lips, cheeks = (regions(on)[name] > 0.8 for name in ("lips", "cheeks"))
-    lip, cheek = (skin.diffuse[on.covered][where].mean(0) for where in (lips, cheeks))
-    assert lip[0] / lip[1] > 1.05 * cheek[0] / cheek[1]
-    assert skin.specular[on.covered][lips].mean() > skin.specular[on.covered][cheeks].mean()
-
-
-def test_pores_brows_and_creases_act_on_all_maps(plain):
-    on = canvas(SIZE)
-    brows = regions(on)["brows"] > 0.9
-    bare = make_skin(replace(PLAIN, brow_density=0.0), SIZE)
-    assert plain.diffuse[on.covered][brows].mean() < 0.8 * bare.diffuse[on.covered][brows].mean()
-    assert plain.specular[on.covered][brows].mean() < 0.9 * bare.specular[on.covered][brows].mean()
-    young = make_skin(replace(PLAIN, age=20.0), SIZE)
-    assert plain.height.min() < young.height.min() - 0.05
-    assert plain.normal[..., 2].min() < young.normal[..., 2].min()
 
 
 def test_the_paint_does_not_know_where_the_uvs_are_cut(plain):
@@ -130,7 +96,7 @@ def test_the_normals_of_a_ramp_are_its_slope_whatever_the_uv_layout():
     tangent = np.linalg.inv(turn)[:, 0] / np.linalg.norm(np.linalg.inv(turn)[:, 0])
     bitangent = np.array([-tangent[1], tangent[0]])
     gradient = np.array([0.1, 0.2])  # mm per mm along x and z
-    found = normals((on.position[:, [0, 2]] @ gradient).astype(np.float32), on)
+    found = relief_normals((on.position[:, [0, 2]] @ gradient).astype(np.float32), on)
     expected = np.array([-gradient @ tangent, -gradient @ bitangent, 1.0])
     right = np.isclose(found, expected / np.linalg.norm(expected), atol=2e-3).all(-1)
     assert right.mean() > 0.995  # all but corner texels without a neighbour along one axis

@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scripts that make the built-in head from the MakeHuman base mesh and targets (CC0)."""
+"""Scripts that make the built-in head from the MakeHuman base mesh and targets (CC0)."""

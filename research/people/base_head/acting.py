@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built-in head cut open: lips and lids in two, with sockets and a mouth bag behind them, eyeballs, teeth and
-tongue.
+"""The built-in head cut open: lips and lids in two, sockets and a mouth bag, eyeballs, teeth and tongue.
 
 The head's vertices keep their numbers; what the cut doubles and what lies inside come after them. Everything is
 MakeHuman's (see NOTICE.md) but the eyeballs, which are spheres with a cornea where its eyes are.
@@ -16,7 +15,7 @@ import scipy.sparse as sparse
 import torch
 from scipy.spatial import cKDTree
 
-from .makehuman import PUPIL_DISTANCE_M, Base, HeadBuilder, catmull_clark, edge_numbers
+from .makehuman import Base, HeadBuilder, catmull_clark, edge_numbers, sides, to_our_axes
 
 SKIN, EYES, MOUTH, TEETH = range(4)
 """Material slots."""
@@ -29,8 +28,7 @@ STRIP_M = 0.004  # UV: how far into the neighbouring skin a ring of the inner ri
 
 @dataclass(frozen=True)
 class ActingHead:
-    """V vertices of the head, C copies on the lower side of the seams, P inner ones; the order of every array with V +
-    C + P rows."""
+    """V vertices of the head, C copies on the lower side of the seams, P inner ones, in this order."""
 
     copies: np.ndarray  # [C] the vertex that each copy doubles
     corners: np.ndarray  # [n, 3]: face of the head, corner, the copy it has now
@@ -47,109 +45,92 @@ class ActingHead:
     balls: np.ndarray  # [2, 4] centre and radius of the left and the right eyeball, metres
 
     def moved(self, offset: np.ndarray) -> np.ndarray:
-        """A displacement of the body [N, 3], decimetres, as one of the open head [V + C + P, 3], decimetres, in our
-        axes."""
-        fine = self.matrix @ offset
-        return np.stack([fine[:, 0], -fine[:, 2], fine[:, 1]], -1)
+        """Return a body displacement [N, 3] as one of the open head [V + C + P, 3] in our axes, both in decimetres."""
+        return to_our_axes(self.matrix @ offset)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Vertices [N, 3] in metres, their faces [F, 4], UVs [N, 2], kinds [N], slots [F] and the matrix from a body."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    uvs: np.ndarray
+    kind: np.ndarray
+    slots: np.ndarray
+    matrix: sparse.csr_matrix
 
 
 def open_head(base: Base, builder: HeadBuilder, body: np.ndarray, uvs: np.ndarray) -> ActingHead:
-    """The open head of one body.
+    """Open the head of a body [N, 3] in decimetres, MakeHuman's axes.
 
-    Parameters
-    ----------
-    base : MakeHuman's body
-    builder : of heads from it
-    body : [N, 3], in decimetres, MakeHuman's axes
-    uvs : [V, 2], the head's, any one of each vertex
+    uvs [V, 2]: the head's, any one of each vertex.
     """
     polygons, inner, parent, extended = _split(base, builder)
     used = np.unique([i for p in polygons + inner for i in p])
     number = np.full(extended.shape[0], -1)
     number[used] = np.arange(len(used))
     fine, triangles = catmull_clark([[int(number[i]) for i in p] for p in polygons + inner], len(used))
-    target = _targets(builder, polygons, inner, parent, used, number)
     welded = len(builder.mirror)
-    lower = _lower(base, builder, parent).astype(float)
-    order, copies = _order(target, fine @ lower[used], welded)
-    matrix = fine @ extended[used]
-    rows = np.argsort(order)
-    matrix = matrix[rows]
-    closed = builder._lips_closed(builder._lids_closed(body))
-    triangles = order[triangles]
-    outer = triangles[: len(builder.faces)]
+    target = _targets(builder, polygons, inner, parent, used, number)
+    order, copies = _order(target, fine @ _lower(base, builder, parent)[used].astype(float), welded)
+    outer, strips = np.split(order[triangles], [len(builder.faces)])
     face, corner = np.nonzero(outer != builder.faces)
-    eyes, teeth = _balls(base, body), _jaws(base)
-    strips = triangles[len(builder.faces) :]
-    placed = _placed(matrix @ closed, body, base)
+    matrix = (fine @ extended[used])[np.argsort(order)]
+    placed = base.place(matrix @ builder.closed(body), body)
     placed[:welded] = builder.head(body)
     placed[welded : welded + len(copies)] = placed[copies]
     kind, uv, anchors, weights, slots = _soft(placed, strips, copies, welded, uvs)
-    start = len(placed)
-    faces = [np.pad(strips, ((0, 0), (0, 1)), constant_values=-1)]
-    kinds, uv_rows, slot_rows, places, matrices = [kind], [uv], [slots], [placed], [matrix]
-    for vertices, quads, part_uv, part_kind, slot, part_matrix in (*eyes, *teeth):
-        faces.append(np.where(quads >= 0, quads + start, -1))
-        kinds.append(np.full(len(part_uv), part_kind))
-        uv_rows.append(part_uv)
-        slot_rows.append(np.full(len(quads), slot))
-        places.append(_placed(part_matrix @ body if vertices is None else vertices, body, base))
-        matrices.append(part_matrix)
-        start += len(part_uv)
-    rest = np.concatenate(places)
-    kinds = np.concatenate(kinds)
-    missing = len(kinds) - len(anchors)
-    balls = [_ball(base, body, side) for side in "lr"]
-    scale = _scale(base, body)
-    balls = np.array([[*_placed(centre[None], body, base)[0], radius * scale] for centre, radius in balls])
-    mouth = (builder._lips[0], *(upper for upper, _ in builder._lids.values()))
-    ends = np.searchsorted(builder.used, [[chain[0], chain[-1]] for chain in mouth])
+    strips = np.pad(strips, ((0, 0), (0, 1)), constant_values=-1)
+    parts = [_Part(placed, strips, uv, kind, slots, matrix), *_balls(base, body), *_jaws(base, body)]
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
+    kind, rest = (np.concatenate([getattr(part, name) for part in parts]) for name in ("kind", "vertices"))
+    missing = len(kind) - len(anchors)
+    middles = [_ball(base, body, side) for side in "lr"]
+    balls = [[*base.place(centre[None], body)[0], radius * base.scale(body)] for centre, radius in middles]
+    rims = (builder.lips[0], *(upper for upper, _ in builder.lids.values()))
+    at = rest[copies]
     return ActingHead(
         copies,
         np.stack([face, corner, outer[face, corner]], 1),
-        np.concatenate(faces),
-        np.concatenate(slot_rows),
-        np.concatenate(uv_rows),
-        kinds,
+        np.concatenate([np.where(p.faces >= 0, p.faces + start, -1) for p, start in zip(parts, starts, strict=True)]),
+        np.concatenate([part.slots for part in parts]),
+        np.concatenate([part.uvs for part in parts]),
+        kind,
         np.pad(anchors, ((0, missing), (0, 0))),
         np.pad(weights, ((0, missing), (0, 0))),
         rest,
-        _seam(rest, copies),
-        ends,
-        sparse.vstack(matrices).tocsr(),
-        balls,
+        np.where(at[:, 2] < -0.02, 0, np.where(at[:, 0] > 0, 1, 2)),
+        np.searchsorted(builder.used, [[rim[0], rim[-1]] for rim in rims]),
+        sparse.vstack([part.matrix for part in parts]).tocsr(),
+        np.array(balls),
     )
 
 
 def _order(target: np.ndarray, lower: np.ndarray, welded: int) -> tuple[np.ndarray, np.ndarray]:
-    """The new number of each vertex [N], which is vertex `target` of the welded head, or none of it where that is
-    negative; and which welded vertices have a second one, [C]. lower [N]: how much of it comes from the lower rim: of
-    the two claimants of a seam's vertex, the lower one takes more."""
-    order, copies, parts = np.empty(len(target), int), [], []
-    claimants = [[] for _ in range(welded)]
-    for i in np.flatnonzero(target >= 0):
-        claimants[target[i]].append(i)
-    for t, claim in enumerate(claimants):
-        first, *second = sorted(claim, key=lambda i: lower[i])
-        order[first] = t
-        for i in second:
-            order[i] = welded + len(copies)
-            copies.append(t)
-    for i in np.flatnonzero(target < 0):
-        order[i] = welded + len(copies) + len(parts)
-        parts.append(i)
-    return order, np.array(copies)
+    """Return the new number of each vertex [N] and the welded vertices that have a second one, [C].
+
+    target [N]: the vertex of the welded head, negative for none; lower [N]: share that comes from the lower rim: of the
+    two claimants of a seam's vertex, the lower one takes more.
+    """
+    order, outer = np.empty(len(target), int), np.flatnonzero(target >= 0)
+    outer = outer[np.lexsort((lower[outer], target[outer]))]
+    second = np.diff(target[outer], prepend=-1) == 0
+    copies = target[outer[second]]
+    order[outer[~second]] = target[outer[~second]]
+    inner = np.flatnonzero(target < 0)
+    order[np.concatenate([outer[second], inner])] = welded + np.arange(len(copies) + len(inner))
+    return order, copies
 
 
 def _split(base: Base, builder: HeadBuilder) -> tuple[list, list, np.ndarray, sparse.csr_matrix]:
-    """Outer and inner polygons with both rims of each seam; which vertex of the welded head stands for each [N']; body
-    -> vertices [N', N].
+    """Cut the seams open: outer and inner polygons, welded vertex of each vertex [N'], body -> vertices [N', N].
 
     The lower lip has fewer vertices than the upper one: it gets new ones, numbered after the body's.
     """
-    upper, lower = builder._lips
+    upper, lower = builder.lips
     count = len(base.vertices)
-    parent = np.concatenate([builder._representative, [i for i, j in zip(upper, lower, strict=True) if j is None]])
+    parent = np.concatenate([builder.representative, [i for i, j in zip(upper, lower, strict=True) if j is None]])
     partners = [k for k, i in enumerate(lower) if i is not None]
     rows, extra = [], {}
     for a, b in zip(partners, partners[1:], strict=False):
@@ -165,31 +146,29 @@ def _split(base: Base, builder: HeadBuilder) -> tuple[list, list, np.ndarray, sp
     ).tocsr()
 
     def grown(polygon):
-        return [
-            i for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True) for i in (int(a), *extra.get((a, b), ()))
-        ]
+        return [i for a, b in sides(polygon) for i in (int(a), *extra.get((a, b), ()))]
 
     cavities = torch.load(base.folder / "template_mesh_internal_cavities.pth", weights_only=True)
-    inner = [base.faces[int(i)] for i in cavities["face_indices"]]
-    near = {i for lids in builder._lids.values() for rim in lids for i in rim.tolist()}
+    inner = [base.faces["body"][int(i)] for i in cavities["face_indices"]]
+    near = {i for lids in builder.lids.values() for rim in lids for i in rim.tolist()}
     socket = [f for f in inner if base.vertices[list(f), 1].min() > 7.05]
-    kept = [f for f in inner if base.vertices[list(f), 1].min() <= 7.05]
+    lining = [f for f in inner if base.vertices[list(f), 1].min() <= 7.05]
     for _ in range(SOCKET_RINGS):
         ring = [f for f in socket if near.intersection(f)]
         near |= {i for f in ring for i in f}
-    kept += ring
-    return [grown(p) for p in builder._open_polygons()], [grown(p) for p in kept], parent, extended
+    lining += ring
+    return [grown(p) for p in builder.open_polygons()], [grown(p) for p in lining], parent, extended
 
 
 def _targets(
     builder: HeadBuilder, polygons: list, inner: list, parent: np.ndarray, used: np.ndarray, number: np.ndarray
 ) -> np.ndarray:
-    """The vertex of the subdivided head that each vertex of the subdivided open head came from, -1 for inner ones."""
+    """Return the subdivided head's vertex that each of the subdivided open head came from, -1 for inner ones."""
     coarse = np.full(len(parent), -1)
     coarse[builder.used] = np.arange(len(builder.used))
     welded = [[int(coarse[parent[i]]) for i in p] for p in polygons]
     edges = edge_numbers(welded)
-    outer_edges = {(min(a, b), max(a, b)) for p in polygons for a, b in zip(p, p[1:] + p[:1], strict=True)}
+    outer_edges = {(min(a, b), max(a, b)) for p in polygons for a, b in sides(p)}
     outer = {i for p in polygons for i in p}
     points = [coarse[parent[i]] if i in outer else -1 for i in used]
     middles = []
@@ -203,29 +182,17 @@ def _targets(
 
 
 def _lower(base: Base, builder: HeadBuilder, parent: np.ndarray) -> np.ndarray:
-    """Whether a vertex lies on the lower rim of a seam, its corners left out [N']."""
+    """Mark the vertices on the lower rim of a seam, its corners left out [N']."""
     lower = np.zeros(len(parent), bool)
-    for _, rim in builder._lids.values():
+    for _, rim in builder.lids.values():
         lower[rim[1:-1]] = True
-    lower[[i for i in builder._lips[1][1:-1] if i is not None]] = True
+    lower[[i for i in builder.lips[1][1:-1] if i is not None]] = True
     lower[len(base.vertices) :] = True
     return lower
 
 
-def _scale(base: Base, body: np.ndarray) -> float:
-    left, right = (body[base.groups[f"joint-{side}-eye"]].mean(0) for side in "lr")
-    return PUPIL_DISTANCE_M / np.linalg.norm(left - right)
-
-
-def _placed(fine: np.ndarray, body: np.ndarray, base: Base) -> np.ndarray:
-    """MakeHuman's decimetres -> metres with the pupils' middle at the origin, as HeadBuilder.head does."""
-    middle = np.mean([body[base.groups[f"joint-{side}-eye"]].mean(0) for side in "lr"], 0)
-    fine = (fine - middle) * _scale(base, body)
-    return np.stack([fine[:, 0], -fine[:, 2], fine[:, 1]], -1)
-
-
 def _soft(placed: np.ndarray, strips: np.ndarray, copies: np.ndarray, welded: int, uvs: np.ndarray) -> tuple:
-    """Kind, UV, anchors and weights of the sockets' and the bag's vertices, and the slot of their faces."""
+    """Return kind, UV, anchors and weights of the sockets' and the bag's vertices, and the slot of their faces."""
     first = welded + len(copies)
     inner = np.arange(first, len(placed))
     ring = np.full(len(placed), 99)
@@ -250,72 +217,57 @@ def _soft(placed: np.ndarray, strips: np.ndarray, copies: np.ndarray, welded: in
 
 
 def _ball(base: Base, body: np.ndarray, side: str) -> tuple[np.ndarray, float]:
-    """Centre [3] and radius of an eye, decimetres: half as wide as MakeHuman's eye, which is a sphere but for its
-    cornea, and touching its back."""
+    """Return centre [3] and radius of an eye, decimetres.
+
+    Half as wide as MakeHuman's eye, which is a sphere but for its cornea, and touching its back.
+    """
     points = body[base.groups[f"helper-{side}-eye"]]
     low, high = points.min(0), points.max(0)
     radius = (high[0] - low[0]) / 2
     return np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2] + radius]), float(radius)
 
 
-def _balls(base: Base, body: np.ndarray) -> list[tuple]:
-    """Both eyeballs: rings around the gaze; UV grows with the angle from the pupil, so that iris and white are rings of
-    a picture."""
-    around, along = 32, 20
-    angle = np.concatenate([np.linspace(0, 0.62, 10), np.linspace(0.62, np.pi, along - 9)[1:]])  # finer on the cornea
+def _balls(base: Base, body: np.ndarray) -> list[_Part]:
+    """Return both eyeballs: rings around the gaze.
+
+    UV grows with the angle from the pupil, so that iris and white are rings of a picture.
+    """
+    around = 32
+    angle = np.concatenate([np.linspace(0, 0.62, 10), np.linspace(0.62, np.pi, 11)[1:]])  # finer on the cornea
     # the cornea's summit stands 0.7 mm before the white's sphere
     bulge = 1 + 0.06 * np.clip(1 - (angle / 0.52) ** 2, 0, None)
     turn = np.arange(around) * 2 * np.pi / around
     ring = np.sin(angle)[1:-1, None] * bulge[1:-1, None]
-    body_of = np.stack(
-        [ring * np.cos(turn), ring * np.sin(turn), (np.cos(angle) * bulge)[1:-1, None] * np.ones(around)], -1
-    ).reshape(-1, 3)
-    unit = np.concatenate([[[0, 0, bulge[0]]], body_of, [[0, 0, -1]]])
+    ahead = (np.cos(angle) * bulge)[1:-1, None] * np.ones(around)
+    rings = np.stack([ring * np.cos(turn), ring * np.sin(turn), ahead], -1).reshape(-1, 3)
+    sphere = np.concatenate([[[0, 0, bulge[0]]], rings, [[0, 0, -1]]])
     # the iris gets the most of the picture
     radius = 0.5 * (np.concatenate([[0], np.repeat(angle[1:-1], around), [np.pi]]) / np.pi) ** 0.6
     turns = np.concatenate([[0], np.tile(turn, len(angle) - 2), [0]])
     uv = 0.5 + np.stack([radius * np.cos(turns), radius * np.sin(turns)], 1)
-    rows = len(angle) - 2
     k = np.arange(around)
-    n = (k + 1) % around
-    faces = [np.stack([0 * k, 1 + k, 1 + n, np.full(around, -1)], 1)]
-    for r in range(rows - 1):
-        a, b = 1 + r * around, 1 + (r + 1) * around
-        faces.append(np.stack([a + k, b + k, b + n, a + n], 1))
-    faces.append(
-        np.stack(
-            [
-                1 + (rows - 1) * around + n,
-                1 + (rows - 1) * around + k,
-                np.full(around, len(unit) - 1),
-                np.full(around, -1),
-            ],
-            1,
-        )
-    )
-    faces = np.concatenate(faces)
-    result = []
+    n, none, last = (k + 1) % around, np.full(around, -1), len(sphere) - 1 - around
+    faces = [np.stack([0 * k, 1 + k, 1 + n, none], 1)]
+    faces += [np.stack([a + k, a + around + k, a + around + n, a + n], 1) for a in range(1, last, around)]
+    faces = np.concatenate([*faces, np.stack([last + n, last + k, none + len(sphere), none], 1)])
+    parts = []
     for side, kind in (("l", LEFT_EYE), ("r", RIGHT_EYE)):
-        centre, r = _ball(base, body, side)
-        result.append((unit * r + centre, faces, uv, kind, EYES, sparse.csr_matrix((len(unit), len(base.vertices)))))
-    return result
+        centre, size = _ball(base, body, side)
+        still = sparse.csr_matrix((len(sphere), len(base.vertices)))
+        kinds, slots = np.full(len(sphere), kind), np.full(len(faces), EYES)
+        parts.append(_Part(base.place(sphere * size + centre, body), faces, uv, kinds, slots, still))
+    return parts
 
 
-def _jaws(base: Base) -> list[tuple]:
-    """Teeth and tongue, MakeHuman's helpers as they are."""
-    result = []
+def _jaws(base: Base, body: np.ndarray) -> list[_Part]:
+    """Return teeth and tongue, MakeHuman's helpers as they are."""
+    parts = []
     for group, slot in (("helper-upper-teeth", TEETH), ("helper-lower-teeth", TEETH), ("helper-tongue", MOUTH)):
         members = base.groups[group]
-        number = np.full(len(base.vertices), -1)
-        number[members] = np.arange(len(members))
-        faces = np.array([[number[i] for i in f] + [-1] * (4 - len(f)) for f in base.helper_faces(group)])
-        matrix = sparse.csr_matrix(
-            (np.ones(len(members)), (np.arange(len(members)), members)), shape=(len(members), len(base.vertices))
-        )
-        result.append((None, faces, np.full((len(members), 2), 0.5), JAWS, slot, matrix))
-    return result
-
-
-def _seam(vertices: np.ndarray, copies: np.ndarray) -> np.ndarray:
-    at = vertices[copies]
-    return np.where(at[:, 2] < -0.02, 0, np.where(at[:, 0] > 0, 1, 2))
+        count, number = len(members), np.full(len(base.vertices), -1)
+        number[members] = np.arange(count)
+        faces = np.array([[number[i] for i in f] + [-1] * (4 - len(f)) for f in base.faces[group]])
+        matrix = sparse.csr_matrix((np.ones(count), (np.arange(count), members)), shape=(count, len(base.vertices)))
+        vertices, uv = base.place(matrix @ body, body), np.full((count, 2), 0.5)
+        parts.append(_Part(vertices, faces, uv, np.full(count, JAWS), np.full(len(faces), slot), matrix))
+    return parts

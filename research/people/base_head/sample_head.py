@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The finished head that the extension opens without a solver: python -m research.people.base_head.sample_head CAPTURE
+"""Make the finished head that the extension opens without a solver, from the demo's solved CAPTURE.
 
-CAPTURE is the demo's, solved from the sample video. Maps and textures are stored at 1K with 8 bits and packed tightly,
-so that the extension stays small; the texture keeps a linear EXR, so that the head can be solved again after a stroke
-of the mask. Of the head there are the vertices only: UVs and faces are those of assets/head.obj.
+python -m research.people.base_head.sample_head CAPTURE. Maps and textures are stored at 1K with 8 bits and packed
+tightly, so that the extension stays small; the texture keeps a linear EXR, so that the head can be solved again after a
+stroke of the mask. Of the head there are the vertices only: UVs and faces are those of assets/head.obj.
 """
 
 from __future__ import annotations
@@ -36,32 +36,30 @@ def main() -> None:
         for name in PICTURES:
             images.write_srgb(folder / name, images.read_srgb(capture.root / name), small=True)
         images.write_data(folder / "shadow_mask_auto.png", images.read_data(capture.shadow_mask_auto), small=True)
-        (folder / "maps").mkdir()
-        albedo = images.resize(images.read_linear(capture.maps_4k / "diffuse_albedo.exr"), SIZE_TEXELS, SIZE_TEXELS)
-        images.write_srgb(folder / "maps/diffuse_albedo.png", images.linear_to_srgb(albedo), small=True)
-        below = images.resize(
-            images.srgb_to_linear(images.read_srgb(capture.maps_4k / "clean_albedo.png")), SIZE_TEXELS, SIZE_TEXELS
-        )
-        images.write_srgb(folder / "maps/clean_albedo.png", images.linear_to_srgb(below), small=True)
-        shutil.copyfile(capture.maps_4k / STRANDS, folder / "maps" / STRANDS)
-        for name in ("specular_albedo.png", "normal.png"):
-            images.write_data(
-                folder / "maps" / name,
-                images.resize(images.read_data(capture.maps_4k / name), SIZE_TEXELS, SIZE_TEXELS),
-                small=True,
-            )
         images.write_linear(folder / "texture.exr", images.read_linear(capture.texture), small=True)
         images.write_data(folder / "texture_confidence.exr", images.read_data(capture.texture_confidence), small=True)
-        images.write_data(
-            folder / "maps/confidence.png",
-            images.resize(images.read_mask(capture.maps / "confidence.png"), CONFIDENCE_TEXELS, CONFIDENCE_TEXELS),
-            small=True,
-        )
+        maps, solved = folder / "maps", capture.maps_4k
+        maps.mkdir()
+        for name, albedo in (
+            ("diffuse_albedo.png", images.read_linear(solved / "diffuse_albedo.exr")),
+            ("clean_albedo.png", images.srgb_to_linear(images.read_srgb(solved / "clean_albedo.png"))),
+        ):
+            small = images.resize(albedo, SIZE_TEXELS, SIZE_TEXELS)
+            images.write_srgb(maps / name, images.linear_to_srgb(small), small=True)
+        for name in ("specular_albedo.png", "normal.png"):
+            small = images.resize(images.read_data(solved / name), SIZE_TEXELS, SIZE_TEXELS)
+            images.write_data(maps / name, small, small=True)
+        confidence = images.read_mask(capture.maps / "confidence.png")
+        small = images.resize(confidence, CONFIDENCE_TEXELS, CONFIDENCE_TEXELS)
+        images.write_data(maps / "confidence.png", small, small=True)
+        shutil.copyfile(solved / STRANDS, maps / STRANDS)
 
 
 def _vertices(head: Path) -> str:
-    """The lines of an OBJ that place its vertices. Raises Problem where the others are not those of the built-in
-    head."""
+    """Return the lines of an OBJ that place its vertices.
+
+    Raises Problem unless the others are those of the built-in head.
+    """
     lines, own = (path.read_text(encoding="utf-8").splitlines() for path in (head, ASSETS / "head.obj"))
     if [line for line in lines if not line.startswith("v ")] != [line for line in own if not line.startswith("v ")]:
         raise Problem(

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The unwrap: a disc (head cut open along the back) laid out on the whole unit square with a wanted scale per triangle,
-without overlap.
+"""The unwrap of a disc (head cut open along the back) onto the unit square, at a wanted scale, without overlap.
 
 It starts from a mean-value embedding, which is free of overlap (Floater 2003), and minimises the symmetric Dirichlet
 energy (Smith and Schaefer 2015) by scalable locally injective mappings (Rabinovich et al. 2017); steps never pass the
@@ -18,19 +17,10 @@ from scipy.sparse.linalg import splu
 def unwrap(
     vertices: np.ndarray, faces: np.ndarray, mirror: np.ndarray, scale: np.ndarray, steps: int = 60
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Lays the head out on the unit square.
+    """Lay the head out: UVs [T, 2] in [0, 1], u = 0.5 the middle, and face_uvs [F, 3].
 
-    Parameters
-    ----------
-    vertices : [V, 3], in metres, left and right alike
-    faces : [F, 3]
-    mirror : [V], the mirrored vertex of each
-    scale : [F], wanted UV length per metre
-    steps : of the minimisation at most
-
-    Returns
-    -------
-    UVs [T, 2] in [0, 1], u = 0.5 the middle, and face_uvs [F, 3].
+    vertices [V, 3] in metres, left and right alike; mirror [V]: the mirrored vertex of each; scale [F]: wanted UV
+    length per metre; steps of the minimisation at most.
     """
     cut_faces, origin, twin, seam_left, seam_right, ring = _cut_open(vertices, faces, mirror)
     points = vertices[origin]
@@ -39,12 +29,13 @@ def unwrap(
     uv = _mean_value_embedding(points, cut_faces, start)
     uv = _symmetric(uv, twin)
     uv = _minimise(uv, cut_faces, rest, fixed, twin, steps)
-    assert (_areas(uv, cut_faces) > 0).all(), "the unwrap overlaps"
+    a, b = uv[cut_faces[:, 1]] - uv[cut_faces[:, 0]], uv[cut_faces[:, 2]] - uv[cut_faces[:, 0]]
+    assert (a[:, 0] * b[:, 1] > a[:, 1] * b[:, 0]).all(), "the unwrap overlaps"
     return uv, cut_faces
 
 
 def _cut_open(vertices, faces, mirror):
-    """Doubles the mid-line vertices of the back of the head up to its crown. The left side (+X) keeps the old ones."""
+    """Double the mid-line vertices of the back of the head up to its crown; the left side (+X) keeps the old ones."""
     edges = {(int(a), int(b)) for f in faces for a, b in zip(f, np.roll(f, -1), strict=True)}
     rim = {a: b for a, b in edges if (b, a) not in edges}
     middle = mirror == np.arange(len(vertices))
@@ -76,8 +67,10 @@ def _cut_open(vertices, faces, mirror):
 
 
 def _boundary(points, seam_left, seam_right, ring):
-    """Which coordinates are held (bool [T, 2]) and the boundary's start: neck below, seam on the sides and from both
-    sides along the top."""
+    """Return the fixed coordinates, bool [T, 2], and the boundary's start.
+
+    Neck below, seam on the sides and from both sides along the top.
+    """
     fixed, start = np.zeros((len(points), 2), bool), np.full((len(points), 2), np.nan)
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points[seam_left], axis=0), axis=1))])
     length /= length[-1]
@@ -120,7 +113,7 @@ def _mean_value_embedding(points, faces, start):
 
 
 def _rest_shapes(corners):
-    """Two edge vectors of each triangle in its own plane: [F, 2, 2], edges as columns."""
+    """Return two edge vectors of each triangle in its own plane: [F, 2, 2], edges as columns."""
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     la = np.linalg.norm(a, axis=1)
     x = (a * b).sum(1) / la
@@ -134,8 +127,11 @@ def _rest_shapes(corners):
 
 
 def _minimise(uv, faces, flat_triangles, fixed, twin, steps):
-    """SLIM: the energy's quadratic proxy at the present map (weights in closed form from its singular values), solved,
-    then a line search."""
+    """Minimise by SLIM.
+
+    The energy's quadratic proxy at the present map (weights in closed form from its singular values) is solved, then a
+    line search.
+    """
     inverse, area = np.linalg.inv(flat_triangles), np.linalg.det(flat_triangles) / 2
     # [F, 3, 2] gradients of the corners' hat functions
     hats = np.stack([-inverse.sum(1), inverse[:, 0], inverse[:, 1]], 1)
@@ -176,7 +172,7 @@ def _energy(uv, faces, inverse, area):
 
 
 def _first_flip(uv, direction, faces):
-    """The largest step before a triangle's area reaches zero."""
+    """Return the largest step before a triangle's area reaches zero."""
     p, d = uv[faces], direction[faces]
     a, b, c, e = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], d[:, 1] - d[:, 0], d[:, 2] - d[:, 0]
 
@@ -192,11 +188,6 @@ def _first_flip(uv, direction, faces):
 
 
 def _symmetric(uv, twin, offset: float = 1.0):
-    """Averaged with its mirror image about u = 0.5 (offset 1) or, for directions, about 0 (offset 0)."""
+    """Average with the mirror image about u = 0.5 (offset 1) or, for directions, about 0 (offset 0)."""
     other = uv[twin] * [-1, 1] + [offset, 0]
     return (uv + other) / 2
-
-
-def _areas(uv, faces):
-    a, b = uv[faces[:, 1]] - uv[faces[:, 0]], uv[faces[:, 2]] - uv[faces[:, 0]]
-    return (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2

@@ -1,4 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Subjects like people: shape outside the identity basis, eyes, strands of hair, clothes, and the phone that films
-them. Beside the bald subjects, whose seeds and results stay as they are."""
+"""Subjects like people: shape outside the identity basis, eyes, strands of hair, clothes, and the filming phone.
+
+They stand beside the bald subjects, whose seeds and results stay as they are.
+"""

@@ -11,7 +11,7 @@ from core.geometry.noise import octaves
 
 from ..canvas import Canvas
 from ..regions import regions
-from .ground import Ground, strew_roots, turned
+from .ground import Ground, strew_roots
 from .person import Person
 
 DENSITY = {"stubble": 0.75, "moustache": 1.3, "full": 0.85}  # hairs per mm^2 where it is densest
@@ -20,19 +20,13 @@ RADIUS_M = {"stubble": 0.00004, "moustache": 0.00005, "full": 0.00006}  # of a h
 
 
 def grow_beard(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
-    """Hairs that leave the mouth aside and fall; a longer beard is bent down and clumps.
+    """Grow a beard that leaves the mouth free and falls; a longer one is bent down and clumps.
 
-    Parameters
-    ----------
-    person : whose beard is not "none"
-    ground : of their head
-    skin : which hairs may not enter
-    rng : of single hairs
+    The person's beard is not "none"; hairs stay out of `skin`.
     """
     on, kind = ground.canvas, person.beard
     density = DENSITY[kind] * beard_density(kind, on, np.random.default_rng([person.seed, 65]))
-    roots = strew_roots(ground, density, _ways(on), rng)
-    roots = turned(roots, rng.normal(0, 0.3, len(roots.at)))
+    roots = strew_roots(ground, density, _ways(on), 0.3, rng)
     count = len(roots.at)
     # a moustache is kept out of the mouth
     upper = np.clip((roots.at[:, 2] - on.landmarks[0, 2] + 6) / 8, 0, 1) * (np.abs(roots.at[:, 0]) < 32)
@@ -52,7 +46,7 @@ def grow_beard(person: Person, ground: Ground, skin: SkinSurface, rng: np.random
 
 
 def beard_density(kind: str, on: Canvas, rng: np.random.Generator) -> np.ndarray:
-    """Where it grows on a canvas, [N] in [0, 1], with the gaps that beards have."""
+    """Return the beard's density on a canvas, [N] in [0, 1], with the gaps that beards have."""
     region = (
         _moustache(on)
         if kind == "moustache"
@@ -63,8 +57,10 @@ def beard_density(kind: str, on: Canvas, rng: np.random.Generator) -> np.ndarray
 
 
 def beard_region(on: Canvas) -> np.ndarray:
-    """Where a man's beard can grow, [N] in [0, 1]: below a line from the ears to the corners of the nose, before the
-    ears, down to below the jaw."""
+    """Return the region [N] in [0, 1] where a man's beard can grow.
+
+    Below a line from the ears to the corners of the nose, before the ears, down to below the jaw.
+    """
     x, y, z = np.abs(on.position[:, 0]), on.position[:, 1], on.position[:, 2]
     nose, corner, chin, ear = (on.landmarks[mark] for mark in (2, 291, 152, 454))
     line = np.interp(
@@ -81,13 +77,13 @@ def beard_region(on: Canvas) -> np.ndarray:
 
 
 def _moustache(on: Canvas) -> np.ndarray:
-    """The part of it above the mouth and at its corners, [N]."""
+    """Return the region's part above the mouth and at its corners, [N]."""
     x, z, corner = np.abs(on.position[:, 0]), on.position[:, 2], on.landmarks[291]
     return beard_region(on) * np.clip((corner[0] + 7 - x) / 6, 0, 1) * np.clip((z - corner[2] + 1) / 5, 0, 1)
 
 
-def _sideburns(on: Canvas, radius: float = 9.0) -> np.ndarray:
-    """Closeness [N] in [0, 1] to the lines before the ears."""
+def _sideburns(on: Canvas) -> np.ndarray:
+    """Return closeness [N] in [0, 1] to the lines before the ears."""
     lines = [
         on.landmarks[a] + t * (on.landmarks[b] - on.landmarks[a])
         for side in SIDEBURNS
@@ -96,11 +92,11 @@ def _sideburns(on: Canvas, radius: float = 9.0) -> np.ndarray:
     ]
     forward = np.array([0, -9.0, 0])
     square = np.min([((on.position - at - forward) ** 2).sum(1) for at in lines], axis=0)
-    return np.exp(-0.5 * square / radius**2).astype(np.float32)
+    return np.exp(-0.5 * square / 9.0**2).astype(np.float32)
 
 
 def _ways(on: Canvas) -> np.ndarray:
-    """Down, and away from the middle below the nose; [N, 3]."""
+    """Return hair directions [N, 3]: down, and away from the middle below the nose."""
     x = on.position[:, :1]
     moustache = np.clip((on.position[:, 2:] - on.landmarks[0, 2] + 8) / 8, 0, 1) * (np.abs(x) < 34)
     aside = np.tanh(x / 8) * (0.22 + 0.9 * moustache)

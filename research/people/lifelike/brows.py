@@ -7,10 +7,11 @@ from __future__ import annotations
 import numpy as np
 
 from core.face.lids import OpenHead
-from core.face.strands import Roots, SkinSurface, Strands, coloured, grow
+from core.face.strands import SkinSurface, Strands, coloured, grow
+from core.geometry.meshes import unit
 
 from ..regions import regions
-from .ground import Ground, strew_roots, turned
+from .ground import Ground, strew_roots
 from .person import Person
 
 RADIUS_M = 0.000045  # of a hair at its root
@@ -18,15 +19,7 @@ UPPER, LOWER = (110, 0.0085), (60, 0.0050)  # lashes on a lid, and their length 
 
 
 def grow_brows(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
-    """Near the nose hairs stand up, then they lie along the brow, and at the tail they point down.
-
-    Parameters
-    ----------
-    person : whose they are
-    ground : of their head
-    skin : which hairs may not enter
-    rng : of single hairs
-    """
+    """Grow brows: upright near the nose, then along the brow, at the tail downwards. Hairs stay out of `skin`."""
     on = ground.canvas
     region = regions(on)["brows"]
     outer = np.abs(on.position[:, :1]) / np.abs(on.landmarks[[70, 300], 0]).mean()  # 0 at the nose ... 1 at the tail
@@ -34,8 +27,7 @@ def grow_brows(person: Person, ground: Ground, skin: SkinSurface, rng: np.random
     way = np.sign(on.position[:, :1]) * [1.0, 0, 0] + rise * [0, 0, 1.0]
     chance = np.clip(region * 2.4 - 1.5 + 0.6 * min(person.brow, 1.3), 0, 1)
     density = (1.25 - 0.6 * outer[:, 0].clip(0, 1)) * 1.15 * person.brow * chance
-    roots = strew_roots(ground, density, way, rng)
-    roots = turned(roots, rng.normal(0, 0.22, len(roots.at)))
+    roots = strew_roots(ground, density, way, 0.22, rng)
     count = len(roots.at)
     tail = np.clip(np.abs(roots.at[:, 0]) / np.abs(on.landmarks[[70, 300], 0]).mean(), 0, 1.2)
     length = rng.uniform(0.0045, 0.0085, count) * (1.05 - 0.25 * tail)
@@ -51,8 +43,7 @@ def grow_brows(person: Person, ground: Ground, skin: SkinSurface, rng: np.random
 
 
 def grow_lashes(person: Person, head: OpenHead, rng: np.random.Generator) -> Strands:
-    """Upper lashes that bow upwards from the edge of the lid (of closed lids: downwards and out), and shorter lower
-    ones."""
+    """Grow upper lashes that bow up from the lid's edge (closed: down and out), and shorter lower ones."""
     points = []
     for ball, (upper, lower) in zip(head.balls, head.rims, strict=True):
         for rim, (count, length), up in ((upper, UPPER, 1.0), (lower, LOWER, -1.0)):
@@ -60,24 +51,20 @@ def grow_lashes(person: Person, head: OpenHead, rng: np.random.Generator) -> Str
             t = np.sort(rng.uniform(0.06, 0.97, count)) * (len(edge) - 1)
             at = np.stack([np.interp(t, np.arange(len(edge)), edge[:, axis]) for axis in range(3)], 1)
             aside = (at - edge.mean(0)) * [1, 0, 0]
-            out = (at - ball.centre) / np.linalg.norm(at - ball.centre, axis=1, keepdims=True)
+            out = unit(at - ball.centre)
             shut = person.openness < 0.2
             outward = np.array([0, -1.0, -0.55 if shut else 0.05 * up]) + 28 * aside + rng.normal(0, 0.13, at.shape)
-            outward /= np.linalg.norm(outward, axis=1, keepdims=True)
             along = np.interp(t / (len(edge) - 1), [0, 0.35, 1], [0.55, 0.9, 1.0])
             size = length * rng.uniform(0.65, 1.1, count) * along
             bow = np.array([0, 0, 0.7 * up if not shut else 0.25])
-            roots = Roots(at + 0.0002 * out, out, outward, at)
-            points.append(_bowed(roots, size, bow))
+            points.append(_bowed(at + 0.0002 * out, unit(outward), size, bow))
     lash = np.concatenate(points)
     colour = coloured(len(lash), np.minimum(np.asarray(person.brow_colour) * 0.6, 0.08), 0.0, rng)
     made_up = 1 + 0.5 * person.skin.make_up
     return Strands(lash, np.full(len(lash), made_up * RADIUS_M, np.float32), colour, "lashes")
 
 
-def _bowed(roots: Roots, length: np.ndarray, bow: np.ndarray, steps: int = 6) -> np.ndarray:
-    """Points [M, steps, 3] along the roots' directions, bent by `bow` [3] (a share of the length at the tip)."""
-    t = np.linspace(0, 1, steps)[None, :, None]
-    return (roots.position[:, None] + length[:, None, None] * (t * roots.direction[:, None] + t**2 * bow)).astype(
-        np.float32
-    )
+def _bowed(root: np.ndarray, direction: np.ndarray, length: np.ndarray, bow: np.ndarray) -> np.ndarray:
+    """Return points [M, 6, 3] from roots along directions [M, 3], bent by `bow` [3] (share of length) at the tip."""
+    t = np.linspace(0, 1, 6)[None, :, None]
+    return (root[:, None] + length[:, None, None] * (t * direction[:, None] + t**2 * bow)).astype(np.float32)

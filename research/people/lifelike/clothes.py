@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a person wears at the neck: a shirt with a round neck or one like a V, and the shoulders beneath."""
+"""A shirt with a round or V neck, and the shoulders beneath."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ ROWS = 44
 
 
 def shirt(person: Person, head: Mesh) -> Mesh:
-    """A ring of cloth around the neck that widens to the shoulders; without UVs."""
+    """Return a ring of cloth around the neck that widens to the shoulders; without UVs."""
     rng = np.random.default_rng([person.seed, 67])
     turn = 2 * np.pi * np.arange(AROUND) / AROUND
     front = np.clip(-np.sin(turn), 0, 1)  # sin = -1 towards the face
@@ -61,7 +61,7 @@ def shirt(person: Person, head: Mesh) -> Mesh:
 
 
 def _cut(head: Mesh, turn: np.ndarray) -> np.ndarray:
-    """How high [len(turn)] in metres the neck ends in each direction around its axis."""
+    """Return the height [len(turn)] in metres of the neck's end in each direction around its axis."""
     edges, count = np.unique(np.sort(head.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), 1), axis=0, return_counts=True)
     rim = head.vertices[np.unique(edges[count == 1])]
     apart, _ = _around(rim[rim[:, 2] < LOWER_THAN_FACE], turn)
@@ -70,8 +70,7 @@ def _cut(head: Mesh, turn: np.ndarray) -> np.ndarray:
 
 
 def _neck(head: Mesh, turn: np.ndarray, edge: np.ndarray) -> np.ndarray:
-    """The neck's radius [len(turn)] in metres at the shirt's edge (height [len(turn)]) in each direction around its
-    axis."""
+    """Return the neck's radius [len(turn)] in metres at the shirt's edge, of height [len(turn)]."""
     near = head.vertices[head.vertices[:, 2] < edge.max() + 0.03]
     apart, reach = _around(near, turn)
     weight = np.exp(-((apart / 0.12) ** 2) - ((near[:, 2] - edge[:, None]) / 0.007) ** 2) + 1e-12
@@ -79,8 +78,7 @@ def _neck(head: Mesh, turn: np.ndarray, edge: np.ndarray) -> np.ndarray:
 
 
 def _around(points: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Angles [len(turn), N] in radians between directions around the neck's axis and points [N, 3], and the points'
-    distances [N] from the axis."""
+    """Return angles [len(turn), N] of directions around the neck's axis to points [N, 3], and their distances [N]."""
     arm = points[:, :2] - NECK
     apart = np.abs((turn[:, None] - np.arctan2(arm[:, 1], arm[:, 0])[None] + np.pi) % (2 * np.pi) - np.pi)
     return apart, np.linalg.norm(arm, axis=1)

@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What else is in a photograph of a person: something behind, something before the face, an open mouth."""
+"""Clutter in a photograph of a person: a backdrop, things before the face, an open mouth."""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
 
+from core.face.faces import LEFT_EYE, RIGHT_EYE
 from core.face.parts import PARTS
 
 from ..environments import Environment, background_radiance
@@ -15,26 +16,16 @@ from .person import BROWS
 LIP_CORNERS, LIP_RIM = (78, 308), (13, 14)
 """Landmarks at the corners of the mouth's opening, and at its upper and lower rim in the middle."""
 SKINS = np.array([[0.62, 0.42, 0.33], [0.45, 0.27, 0.18], [0.22, 0.12, 0.075], [0.07, 0.04, 0.027]])
-EYES = ((33, 133), (362, 263))
 RIMS = 0.1
 
 
 def paint_backdrop(
     directions: np.ndarray, environment: Environment, light: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """What is behind the person: the panorama out of focus, or walls and cloth of any colour, with or without things
-    before them.
+    """Paint what is behind the person, linear radiance [S, S, 3].
 
-    Parameters
-    ----------
-    directions : [S, S, 3], unit, from the camera through the pixels, in the head's axes
-    environment : what lights the person
-    light : radiance of a white thing
-    rng : of all of it
-
-    Returns
-    -------
-    [S, S, 3], linear radiance.
+    The panorama out of focus, or walls and cloth of any colour, with or without things before them. directions [S, S,
+    3]: unit, through the pixels, in the head's axes; light: radiance of a white thing.
     """
     size = len(directions)
     kind = rng.random()
@@ -51,13 +42,8 @@ def paint_backdrop(
             ground = ground * np.clip(blobs, 0.1, 5)
     if rng.random() < 0.6:
         for _ in range(int(rng.integers(1, 14))):
-            ground = _thing(
-                ground,
-                rng.uniform(-0.1, 1.1, 2) * size,
-                np.exp(rng.uniform(np.log(0.02), np.log(0.4))) * size,
-                light,
-                rng,
-            )[0]
+            at, reach = rng.uniform(-0.1, 1.1, 2) * size, np.exp(rng.uniform(np.log(0.02), np.log(0.4))) * size
+            ground, _ = _thing(ground, at, reach, light, rng)
     blur = np.exp(rng.uniform(np.log(0.4), np.log(9.0)))
     return cv2.GaussianBlur(np.maximum(ground, 0), (0, 0), blur)
 
@@ -70,20 +56,10 @@ def cover_person(
     rng: np.random.Generator,
     rims: float = RIMS,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Things before the person, a hat or the rims of glasses, now and then: they are background.
+    """Put things, a hat or rims of glasses before the person now and then; return radiance and shares.
 
-    Parameters
-    ----------
-    radiance : [S, S, 3], linear
-    shares : [S, S, len(PARTS)], of the parts
-    landmarks : [468, 2], in pixels
-    light : radiance of a white thing
-    rng : of all of it
-    rims : share of the pictures with glasses
-
-    Returns
-    -------
-    The radiance and the shares with them.
+    radiance [S, S, 3], linear; shares [S, S, len(PARTS)], the cover is background; landmarks [468, 2] in pixels; light:
+    radiance of a white thing; rims: share of the pictures with glasses.
     """
     size, face = len(radiance), float(np.ptp(landmarks[:, 1]))
     hidden = np.zeros((size, size), np.float32)
@@ -94,14 +70,8 @@ def cover_person(
     if rng.random() < 0.08:
         crown, chin = landmarks[10], landmarks[152]
         up = (crown - chin) / max(np.linalg.norm(crown - chin), 1e-6)
-        radiance, over = _thing(
-            radiance,
-            crown + up * face * rng.uniform(0.15, 0.6),
-            face * rng.uniform(0.4, 0.75),
-            light,
-            rng,
-            kind="ellipse",
-        )
+        at, reach = crown + up * face * rng.uniform(0.15, 0.6), face * rng.uniform(0.4, 0.75)
+        radiance, over = _thing(radiance, at, reach, light, rng, kind="ellipse")
         hidden = np.maximum(hidden, over)
     if rng.random() < rims:
         radiance, over = _glasses(radiance, landmarks, light, rng)
@@ -114,18 +84,10 @@ def cover_person(
 def open_mouth(
     albedo: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A mouth that stands open on a quarter of the people: dark, with teeth or without; it belongs to the lips.
+    """Open the mouth of a quarter of the people, with teeth or without; return albedo and shares.
 
-    Parameters
-    ----------
-    albedo : [S, S, 3], linear
-    shares : [S, S, len(PARTS)], of the parts
-    landmarks : [468, 2], in pixels
-    rng : whether, and how wide
-
-    Returns
-    -------
-    The albedo and the shares with it.
+    The mouth is dark and belongs to the lips. albedo [S, S, 3], linear; shares [S, S, len(PARTS)]; landmarks [468, 2]
+    in pixels.
     """
     if rng.random() > 0.25:
         return albedo, shares
@@ -138,19 +100,9 @@ def open_mouth(
     gape, turn = rng.uniform(0.1, 0.45), np.linspace(0, np.pi, 24)
     lower = middle + np.cos(turn)[:, None] * half + np.sin(turn)[:, None] * down * gape
     upper = middle - np.cos(turn)[:, None] * half - np.sin(turn)[:, None] * down * gape * rng.uniform(0.0, 0.5)
-    opening = _filled(size, np.concatenate([lower, upper]))
-    teeth = _filled(
-        size,
-        np.concatenate(
-            [
-                middle
-                + np.cos(turn)[:, None] * half * 0.9
-                + np.sin(turn)[:, None] * down * gape * rng.uniform(0.2, 0.8),
-                upper,
-            ]
-        ),
-    )
-    teeth = teeth * opening * (rng.random() < 0.75)
+    opening = fill_outline((size, size), np.concatenate([lower, upper]))
+    edge = middle + np.cos(turn)[:, None] * half * 0.9 + np.sin(turn)[:, None] * down * gape * rng.uniform(0.2, 0.8)
+    teeth = fill_outline((size, size), np.concatenate([edge, upper])) * opening * (rng.random() < 0.75)
     there = 1 - shares[..., -1]
     inner = np.float32([0.03, 0.012, 0.01]) * np.float32(rng.uniform(0.3, 2.5))
     white = np.float32([0.55, 0.5, 0.42]) * np.float32(rng.uniform(0.6, 1.2))
@@ -163,7 +115,7 @@ def open_mouth(
 def _thing(
     ground: np.ndarray, at: np.ndarray, reach: float, light: float, rng: np.random.Generator, kind: str = ""
 ) -> tuple[np.ndarray, np.ndarray]:
-    """One thing drawn onto a picture, and where it is [S, S]."""
+    """Draw one thing onto a picture; return it and the thing's cover [S, S]."""
     size = len(ground)
     kind = kind or str(rng.choice(["ellipse", "polygon", "bar"]))
     if kind == "polygon":
@@ -175,22 +127,15 @@ def _thing(
         along = reach * (1.0 if kind == "ellipse" else 3.0)
         c, s = np.cos(lean), np.sin(lean)
         outline = at + np.stack([along * np.cos(turn), across * np.sin(turn)], 1) @ np.array([[c, s], [-s, c]])
-    where = cv2.GaussianBlur(_filled(size, outline), (0, 0), rng.uniform(0.3, 1.5))
-    drawn = rng.random()
-    colour = (
-        SKINS[rng.integers(len(SKINS))]
-        if drawn < 0.25
-        else BROWS[rng.integers(len(BROWS))]
-        if drawn < 0.4
-        else rng.uniform(0.01, 0.9, 3)
-    )
-    texture = np.exp(
-        cv2.resize(
-            rng.normal(0, rng.uniform(0.05, 0.5), (24, 24, 1)).astype(np.float32),
-            (size, size),
-            interpolation=cv2.INTER_CUBIC,
-        )
-    )[..., None]
+    where = cv2.GaussianBlur(fill_outline((size, size), outline), (0, 0), rng.uniform(0.3, 1.5))
+    chance = rng.random()
+    if chance < 0.4:
+        colours = SKINS if chance < 0.25 else BROWS
+        colour = colours[rng.integers(len(colours))]
+    else:
+        colour = rng.uniform(0.01, 0.9, 3)
+    texture = rng.normal(0, rng.uniform(0.05, 0.5), (24, 24, 1)).astype(np.float32)
+    texture = np.exp(cv2.resize(texture, (size, size), interpolation=cv2.INTER_CUBIC))[..., None]
     shade = np.float32(light * np.exp(rng.normal(-0.2, 0.6)))
     painted = np.asarray(colour, np.float32) * texture * shade
     return ground * (1 - where[..., None]) + painted * where[..., None], where
@@ -199,11 +144,11 @@ def _thing(
 def _glasses(
     radiance: np.ndarray, landmarks: np.ndarray, light: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The rims of a pair of glasses, and where they are [S, S]."""
+    """Draw the rims of a pair of glasses; return the picture and their cover [S, S]."""
     size = len(radiance)
     over = np.zeros((size, size), np.uint8)
     thick, round_ = int(rng.integers(1, 4)), rng.uniform(0.55, 1.0)
-    for eye in EYES:
+    for eye in (RIGHT_EYE, LEFT_EYE):
         one, other = landmarks[list(eye)]
         reach = 0.85 * np.linalg.norm(other - one)
         turn = float(np.degrees(np.arctan2(*(other - one)[::-1])))
@@ -214,8 +159,8 @@ def _glasses(
     return radiance * (1 - where[..., None]) + colour * where[..., None], where
 
 
-def _filled(size: int, outline: np.ndarray) -> np.ndarray:
-    """1 inside of an outline [N, 2] in pixels, smooth at its edge, [S, S]."""
-    mask = np.zeros((size, size), np.uint8)
+def fill_outline(shape: tuple[int, int], outline: np.ndarray) -> np.ndarray:
+    """Fill an outline [N, 2] in pixels with 1, smooth at its edge, [H, W]."""
+    mask = np.zeros(shape, np.uint8)
     cv2.fillPoly(mask, [np.round(16 * (outline - 0.5)).astype(np.int32)], 255, cv2.LINE_AA, 4)
     return mask.astype(np.float32) / 255

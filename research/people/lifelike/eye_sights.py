@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a camera sees of one eye before there is light, and the photographs that become of it: what the eye reader
-(face/eye_reader.py) learns from.
+"""Views of one eye without light, and the photographs made of them, for the eye reader (face/eye_reader.py).
 
 An eye's look is varied far beyond the figures' own: whites from grey to glaring, irises of any colour, lines of make-up
 along the lids, lids of other shapes, reflections of windows and lamps.
@@ -14,22 +13,22 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import pycolmap
 
 from core.capture.files import replacing
 from core.face.faces import LEFT_EYE, RIGHT_EYE
 from core.face.lids import open_lids
-from core.face.parts import PARTS
 from core.geometry import raster
 from core.geometry.views import View
 from core.imaging import images
 
+from ..cameras import pinhole_view
 from . import brows, unlit
+from .clutter import fill_outline
 from .eyes import IRIS_MM
 from .figure import PARTS as GROWN
 from .figure import Figure
 from .snapshot import photograph
-from .truth import Scene
+from .truth import Scene, block_mean
 
 SIZE, SPAN, OVER = 160, 3.2, 2
 """Of the square around an eye: its side in pixels and in distances between the eye's corners; rays along a pixel's
@@ -38,7 +37,6 @@ FAR_DEG, NEAR_DEG = 40.0, 65.0
 """How far the camera may stand on the other side of the nose, and on the eye's own."""
 SHUT = 0.08
 """Share of the sights with closed lids."""
-EYES, SKIN = PARTS.index("eyes"), PARTS.index("skin")
 IRISES = np.array(
     [
         [0.010, 0.006, 0.004],
@@ -54,8 +52,11 @@ IRISES = np.array(
 
 @dataclass(frozen=True)
 class EyeSight:
-    """unlit: a square around one eye; ball uint8 [S, S, 2] of 255: how much of a pixel is the eyeball's white, and its
-    iris with the pupil; corners [2, 2]: the landmarks at the outer and the inner corner, in pixels; left: whose."""
+    """A square around one eye.
+
+    ball uint8 [S, S, 2] of 255: share of a pixel that is the eyeball's white, and its iris with the pupil; corners [2,
+    2]: the landmarks at the outer and the inner corner, in pixels; left: True for the left eye.
+    """
 
     unlit: unlit.Unlit
     ball: np.ndarray
@@ -64,7 +65,7 @@ class EyeSight:
 
 
 def with_other_lids(figure: Figure, rng: np.random.Generator) -> Figure:
-    """The same person with lids that are open otherwise, looking elsewhere."""
+    """Return the same person with lids open otherwise, looking elsewhere."""
     openness = 0.0 if rng.random() < SHUT else rng.uniform(0.3, 1.4)
     gaze = np.clip(rng.normal(0, [14, 8]), -30, 30)
     opened = open_lids(figure.head, openness, gaze)
@@ -74,7 +75,7 @@ def with_other_lids(figure: Figure, rng: np.random.Generator) -> Figure:
 
 
 def see_eye(scene: Scene, left: bool, rng: np.random.Generator) -> EyeSight:
-    """One eye of a person from anywhere from where it is seen."""
+    """Show one eye of a person from a random place from which it is visible."""
     ends = unlit.landmarks_of(scene.figure)[list(LEFT_EYE[::-1] if left else RIGHT_EYE)]
     while True:
         far = unlit.random_view(scene.figure, rng, 100, 1.0)
@@ -90,7 +91,7 @@ def see_eye(scene: Scene, left: bool, rng: np.random.Generator) -> EyeSight:
     angle = np.pi * (2 * np.hypot(*(uv - 0.5).T)).clip(0, 1) ** (1 / 0.6)  # as lids.PosedEyeball says
     iris = np.sin(np.minimum(angle, np.pi / 2)) * 1000 * scene.figure.opened.balls[0].radius < IRIS_MM
     ball[on_ball] = np.stack([~iris, iris], 1)
-    ball = ball.reshape(SIZE, OVER, SIZE, OVER, 2).mean((1, 3))
+    ball = block_mean(ball, OVER)
     return EyeSight(
         unlit.trace_unlit(scene, view, rng, OVER),
         np.round(255 * ball).astype(np.uint8),
@@ -102,7 +103,7 @@ def see_eye(scene: Scene, left: bool, rng: np.random.Generator) -> EyeSight:
 def photograph_eye(
     sight: EyeSight, rng: np.random.Generator, panoramas: list[np.ndarray] = ()
 ) -> tuple[np.ndarray, np.ndarray]:
-    """An sRGB picture [S, S, 3] of an eye and how much of a pixel is white and iris [S, S, 2], float32 in [0, 1]."""
+    """Photograph an eye: sRGB [S, S, 3] and the shares of white and iris [S, S, 2], float32 in [0, 1]."""
     ball = sight.ball.astype(np.float32) / 255
     albedo = images.srgb_to_linear(sight.unlit.albedo.astype(np.float32) / 255)
     coloured = _coloured(albedo, ball, sight.corners, rng)
@@ -114,8 +115,8 @@ def photograph_eye(
 
     picture, shares = photograph(shown, rng, panoramas, mirrored)
     before = sight.unlit.shares[..., :-1].astype(np.float32).sum(-1) / 255
-    left = np.clip(shares[..., :-1].sum(-1) / np.maximum(before, 1e-3), 0, 1)  # by what lies before it
-    return _bent(picture, ball * left[..., None], rng)
+    uncovered = np.clip(shares[..., :-1].sum(-1) / np.maximum(before, 1e-3), 0, 1)  # by what lies before it
+    return _bent(picture, ball * uncovered[..., None], rng)
 
 
 def save(path: Path, sight: EyeSight) -> None:
@@ -132,27 +133,26 @@ def load(path: Path) -> EyeSight:
 
 
 def _around(far: View, ends: np.ndarray) -> View:
-    """A square of SPAN corner distances around an eye, from where a view stands. An eye that is seen from the side is
-    not drawn larger than from in front."""
+    """Return a square of SPAN corner distances around an eye, from a view's place.
+
+    An eye seen from the side is not drawn larger than from in front.
+    """
     pixels, depth = far.project(ends)
     focal, *at = far.camera.params[[0, 2, 3]]
     frontal = focal * np.linalg.norm(ends[1] - ends[0]) / depth.mean()
     enlarged = SIZE / (SPAN * max(np.linalg.norm(pixels[1] - pixels[0]), 0.6 * frontal))
-    shift = SIZE / 2 - enlarged * (pixels.mean(0) - at)
-    camera = pycolmap.Camera(
-        model="PINHOLE", width=SIZE, height=SIZE, params=[enlarged * focal, enlarged * focal, *shift]
-    )
-    return View("", Path(), camera, far.rotation, far.translation, True)
+    principal = SIZE / 2 - enlarged * (pixels.mean(0) - at)
+    return pinhole_view((SIZE, SIZE), enlarged * focal, principal, far.rotation, far.translation)
 
 
 def _coloured(albedo: np.ndarray, ball: np.ndarray, corners: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The linear albedo [S, S, 3] with another white, another iris, and make-up along the lids."""
+    """Give the linear albedo [S, S, 3] another white, another iris, and make-up along the lids."""
     log = np.zeros_like(albedo)
     white, iris = ball[..., :1], ball[..., 1:]
     log += white * (rng.normal(0.15, 0.3) + rng.normal(0, [0.03, 0.07, 0.09]))
     if rng.random() < 0.7:
-        seen = iris[..., 0] > 0.9
-        mean = albedo[seen].mean(0) if seen.any() else np.array([0.03, 0.02, 0.01])
+        inside = iris[..., 0] > 0.9
+        mean = albedo[inside].mean(0) if inside.any() else np.array([0.03, 0.02, 0.01])
         goal = IRISES[rng.integers(len(IRISES))] * np.exp(rng.normal(0, 0.3)) * np.exp(rng.normal(0, 0.12, 3))
         log += iris * np.log(goal / np.maximum(mean, 0.003))
     lids = 1 - ball.sum(-1)
@@ -171,31 +171,29 @@ def _coloured(albedo: np.ndarray, ball: np.ndarray, corners: np.ndarray, rng: np
 def _with_reflections(
     radiance: np.ndarray, ball: np.ndarray, width: float, light: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """What a wet ball mirrors: a window with its bars, lamps."""
-    seen = ball.sum(-1)
-    if seen.max() < 0.5:
+    """Add the reflections on a wet ball: a window with its bars, lamps."""
+    cover = ball.sum(-1)
+    if cover.max() < 0.5:
         return radiance
     middle = np.average(
-        np.indices(seen.shape).reshape(2, -1).T[:, ::-1],
+        np.indices(cover.shape).reshape(2, -1).T[:, ::-1],
         axis=0,
         weights=(ball[..., 1] + 0.05 * ball[..., 0]).ravel() + 1e-9,
     )
-    glare = np.zeros_like(seen)
+    glare = np.zeros_like(cover)
     for _ in range(rng.integers(0, 4)):
         at = middle + rng.normal(0, 0.12 * width, 2)
         half = width * np.exp(rng.uniform(*np.log([0.008, 0.09]), 2))
         turn = rng.normal(0, 0.2) if rng.random() < 0.7 else rng.uniform(0, np.pi)
         box = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
         outline = at + box @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
-        drawn = np.zeros(seen.shape, np.uint8)
-        cv2.fillPoly(drawn, [np.round(16 * outline).astype(np.int32)], 255, cv2.LINE_AA, 4)
-        glare = np.maximum(glare, drawn.astype(np.float32) / 255 * rng.uniform(0.05, 2.0))
-    glare = cv2.GaussianBlur(glare, (0, 0), rng.uniform(0.3, 1.2)) * seen
+        glare = np.maximum(glare, fill_outline(cover.shape, outline + 0.5) * rng.uniform(0.05, 2.0))
+    glare = cv2.GaussianBlur(glare, (0, 0), rng.uniform(0.3, 1.2)) * cover
     return radiance + np.float32(light) * glare[..., None]
 
 
 def _bent(picture: np.ndarray, ball: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Picture and shares as a smooth warp makes them: lids have more shapes than the figures'."""
+    """Warp picture and shares smoothly: lids have more shapes than the figures'."""
     cells = int(rng.integers(4, 8))
     shift = rng.normal(0, rng.uniform(0, 0.02) * SIZE, (cells, cells, 2)).astype(np.float32)
     shift = cv2.resize(shift, (SIZE, SIZE), interpolation=cv2.INTER_CUBIC)

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The picture on an eyeball: white with its vessels, iris with fibres and a darker rim, pupil. Rings about the middle,
-as lids.PosedEyeball says."""
+"""The picture on an eyeball: white with vessels, iris with fibres and a darker rim, pupil.
+
+Rings about the middle, as lids.PosedEyeball says.
+"""
 
 from __future__ import annotations
 
@@ -14,18 +16,9 @@ VESSELS = np.array([0.55, 0.20, 0.15])
 
 
 def paint_eyes(iris: np.ndarray, ball_radius: float, seed: int, size: int = 512) -> np.ndarray:
-    """The albedo of both eyes of a person, in the eyeball's UVs.
+    """Return the linear albedo of both eyes in the eyeball's UVs, float32 [size, size, 3].
 
-    Parameters
-    ----------
-    iris : [3], its linear albedo
-    ball_radius : of the eyeball, in metres
-    seed : the person
-    size : pixels along a side
-
-    Returns
-    -------
-    Linear, float32 [size, size, 3].
+    iris [3]: its linear albedo; ball_radius in metres.
     """
     rng = np.random.default_rng([seed, 64])
     y, x = (np.mgrid[0:size, 0:size] + 0.5) / size - 0.5
@@ -53,6 +46,6 @@ def paint_eyes(iris: np.ndarray, ball_radius: float, seed: int, size: int = 512)
 
 
 def _step(x: np.ndarray, at: float, width: float) -> np.ndarray:
-    """A smooth step from 0 to 1 about `at`."""
+    """Return a smooth step from 0 to 1 about `at`."""
     t = np.clip((x - at) / width + 0.5, 0, 1)
     return t * t * (3 - 2 * t)

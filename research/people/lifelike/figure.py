@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A whole person, put together: open or closed head, eyes, hair, clothes, and the maps of the skin with and without
-what grows on it."""
+"""A whole person: head, eyes, hair, clothes, and the skin's maps with and without what grows on it."""
 
 from __future__ import annotations
 
@@ -32,9 +31,12 @@ UNDER = {"hair": 0.8, "beard": 0.35, "brows": 0.15}
 
 @dataclass(frozen=True)
 class Figure:
-    """head: the closed head in the template's topology; opened: the same with its lids as they are; skin: the bare
-    skin's maps; seen float32 [S, S, 3]: its linear albedo between the roots of hair; eye [E, E, 3]: the eyes' albedo;
-    growth: UV map of each growth in [0, 1], [S, S] by part; strands: all hairs."""
+    """A person ready to be filmed.
+
+    head: closed, in the template's topology; opened: with its lids as they are; skin: the bare skin's maps; seen
+    float32 [S, S, 3]: its linear albedo between the roots of hair; eye [E, E, 3]: the eyes' albedo; growth: UV map of
+    each growth in [0, 1], [S, S] by part; strands: all hairs.
+    """
 
     person: Person
     head: Mesh
@@ -48,29 +50,18 @@ class Figure:
 
 
 def make_figure(person: Person | int, size: int = 2048, facekit: Path | None = None) -> Figure:
-    """A person, or the one that a seed stands for, with maps of `size` texels. The same arguments give the same
-    bytes."""
-    if not isinstance(person, Person):
-        person = sample_person(person)
+    """Make a person, or the one of a seed, with maps of `size` texels; the same arguments give the same bytes."""
+    person = person if isinstance(person, Person) else sample_person(person)
     head = person_mesh(person.seed, facekit)
-    opened = open_lids(head, person.openness if person.openness >= OPENEST else 0.0, np.array(person.gaze))
-    skin, seen, growth = paint(person, size)
+    open_head = open_lids(head, person.openness if person.openness >= OPENEST else 0.0, np.array(person.gaze))
+    skin, albedo, growth = paint(person, size)
     cloth = shirt(person, head)
-    return Figure(
-        person,
-        head,
-        opened,
-        cloth,
-        skin,
-        seen,
-        eyes.paint_eyes(np.array(person.iris), opened.balls[0].radius, person.seed),
-        growth,
-        grow_hair(person, head, opened, cloth),
-    )
+    eye = eyes.paint_eyes(np.array(person.iris), open_head.balls[0].radius, person.seed)
+    return Figure(person, head, open_head, cloth, skin, albedo, eye, growth, grow_hair(person, head, open_head, cloth))
 
 
 def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.ndarray]]:
-    """The bare skin's maps, its albedo between the roots [S, S, 3], and where hair grows [S, S] by part."""
+    """Return the bare skin's maps, its albedo between the roots [S, S, 3], and hair's density [S, S] by part."""
     on = canvas(size)
     skin = paint_skin(person.skin, on, canvas(GROUND), traits.broad_traits(person, on), hair=False)
     diffuse = traits.shaded(person, on, skin.diffuse[on.covered])
@@ -89,26 +80,12 @@ def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.nda
 
 
 def grow_hair(person: Person, head: Mesh, opened: OpenHead, cloth: Mesh) -> tuple[Strands, ...]:
-    """All hairs of a person: brows, lashes, and beard and hair where there are any.
-
-    Parameters
-    ----------
-    person : whose they are
-    head : their closed head, in the template's topology
-    opened : the same with its lids as they are
-    cloth : on which long hair lies
-    """
+    """Grow all hairs of a person; long hair lies on `cloth`."""
     ground, skin = ground_of(head), SkinSurface(head)
-    strands = [
-        brows.grow_brows(person, ground, skin, _rng(person, 0)),
-        brows.grow_lashes(person, opened, _rng(person, 1)),
-    ]
+    rngs = [np.random.default_rng([person.seed, 68, growth]) for growth in range(4)]
+    strands = [brows.grow_brows(person, ground, skin, rngs[0]), brows.grow_lashes(person, opened, rngs[1])]
     if person.beard != "none":
-        strands.append(beards.grow_beard(person, ground, skin, _rng(person, 2)))
+        strands.append(beards.grow_beard(person, ground, skin, rngs[2]))
     if person.hair != "none":
-        strands.append(head_hair.grow_head_hair(person, ground, SkinSurface(joined([head, cloth])), _rng(person, 3)))
+        strands.append(head_hair.grow_head_hair(person, ground, SkinSurface(joined([head, cloth])), rngs[3]))
     return tuple(strands)
-
-
-def _rng(person: Person, growth: int) -> np.random.Generator:
-    return np.random.default_rng([person.seed, 68, growth])

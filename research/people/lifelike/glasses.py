@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pairs of glasses on people: two rims, a bridge and temples as curves before the head, drawn into what a camera sees
-of it.
+"""Glasses on people: two rims, a bridge and temples as curves, drawn into a picture of the head.
 
 The measures are those of frames as opticians sell them: lenses of 42 to 60 mm, bridges of 13 to 23, some 12 mm before
 the eye, leaning in below by 2 to 12 degrees.
@@ -15,6 +14,8 @@ import cv2
 import numpy as np
 
 from core.geometry.views import View
+
+from .clutter import fill_outline
 
 EYES, BRIDGE, SIDES = ((33, 133), (263, 362)), (168, 6), (234, 454)
 """Landmarks at the corners of the eyes, the right one first; on the bridge of the nose; before the ears."""
@@ -39,9 +40,12 @@ COLOURS = np.array(
 
 @dataclass(frozen=True)
 class Glasses:
-    """rims: two closed curves [STEPS, 3] in metres in the head's axes; bars: bridge and temples, open curves [N, 3];
-    rim, bar: their thickness in metres; solid: how opaque each rim is along its curve [STEPS]; colour: linear albedo
-    [3]; shiny in [0, 1]; passes [3]: what the lenses let through."""
+    """A pair in the head's axes.
+
+    rims: two closed curves [STEPS, 3] in metres; bars: bridge and temples, open curves [N, 3]; rim, bar: their
+    thickness in metres; solid: opacity along a rim's curve [STEPS]; colour: linear albedo [3]; shiny in [0, 1]; passes
+    [3]: transmission of the lenses.
+    """
 
     rims: tuple[np.ndarray, np.ndarray]
     bars: tuple[np.ndarray, ...]
@@ -54,8 +58,7 @@ class Glasses:
 
 
 def sample_glasses(landmarks: np.ndarray, rng: np.random.Generator, kind: str = "") -> Glasses:
-    """A pair, of any kind or of one of KINDS, for a head whose landmarks [468, 3] lie there, metres, face towards
-    -Y."""
+    """Draw a pair, of one of KINDS or any, for a head with landmarks [468, 3] in metres, face towards -Y."""
     kind = kind or str(rng.choice(KINDS, p=OFTEN))
     eyes = np.array([landmarks[list(corners)].mean(0) for corners in EYES])
     front = min(eyes[:, 1].mean() - 0.013, landmarks[list(BRIDGE), 1].min() - 0.002) + rng.normal(0, 0.001)
@@ -68,7 +71,7 @@ def sample_glasses(landmarks: np.ndarray, rng: np.random.Generator, kind: str = 
     along, up = (np.sign(component) * np.abs(component) ** (2 / square) for component in (np.cos(turn), np.sin(turn)))
 
     def place(x: np.ndarray, z: np.ndarray, ahead: float | np.ndarray = 0.0) -> np.ndarray:
-        """Points of the front from across the middle and from the rims' middle, metres."""
+        """Return points of the front at distances from the middle and from the rims' middle, metres."""
         return np.stack([middle + x, front - ahead - lean * z + wrap * x**2, level + z], -1)
 
     at = gap / 2 + wide
@@ -85,51 +88,26 @@ def sample_glasses(landmarks: np.ndarray, rng: np.random.Generator, kind: str = 
         share = np.linspace(0, 1, 40)[:, None]
         corner = begin + [side * rng.uniform(0.002, 0.006), 0.004, 0.0]
         bars.append(np.concatenate([[begin], corner + share * (end - corner)]))
-    rim = (
-        np.exp(rng.uniform(*np.log([0.0025, 0.007])))
-        if kind in ("thick", "sunglasses")
-        else np.exp(rng.uniform(*np.log([0.0008, 0.0025])))
-    )
-    solid = np.ones(STEPS)
+    thickness = [0.0025, 0.007] if kind in ("thick", "sunglasses") else [0.0008, 0.0025]
+    rim, solid = np.exp(rng.uniform(*np.log(thickness))), np.ones(STEPS)
     if kind == "half":
         solid = np.clip(0.5 + 3 * (up + 0.2), 0.12, 1)
     if kind == "rimless":
         rim, solid = 0.0012, np.full(STEPS, rng.uniform(0.1, 0.35))
     colour = COLOURS[rng.integers(len(COLOURS))] * np.exp(rng.normal(0, 0.25)) * np.exp(rng.normal(0, 0.08, 3))
-    passes = (
-        rng.uniform(0.86, 0.98) * np.exp(rng.normal(0, 0.02, 3))
-        if kind != "sunglasses"
-        else rng.uniform(0.03, 0.35) * np.exp(rng.normal(0, 0.2, 3))
-    )
-    return Glasses(
-        rims,
-        tuple(bars),
-        float(rim),
-        float(max(0.0011, rim * rng.uniform(0.6, 1.1)) if kind != "rimless" else rng.uniform(0.001, 0.002)),
-        solid,
-        np.clip(colour, 0.003, 0.85),
-        float(rng.random()),
-        passes,
-    )
+    low, high, tint = (0.03, 0.35, 0.2) if kind == "sunglasses" else (0.86, 0.98, 0.02)
+    passes = rng.uniform(low, high) * np.exp(rng.normal(0, tint, 3))
+    bar = rng.uniform(0.001, 0.002) if kind == "rimless" else max(0.0011, rim * rng.uniform(0.6, 1.1))
+    colour = np.clip(colour, 0.003, 0.85)
+    return Glasses(rims, tuple(bars), float(rim), float(bar), solid, colour, float(rng.random()), passes)
 
 
 def put_on(
     radiance: np.ndarray, view: View, depth: np.ndarray, glasses: Glasses, light: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """The picture of a head with the glasses before it.
+    """Draw the glasses before a head; linear radiance [H, W, 3].
 
-    Parameters
-    ----------
-    radiance : [H, W, 3], linear
-    view : the camera, in the head's axes
-    depth : [H, W], metres from the camera to what is seen
-    glasses : as they sit on that head
-    light : radiance of a white thing
-    rng : of their shading, shadow and reflections
-
-    Returns
-    -------
-    [H, W, 3], linear radiance.
+    view: in the head's axes; depth [H, W]: metres from the camera; light: radiance of a white thing.
     """
     frame, colour = np.zeros(radiance.shape[:2], np.float32), np.zeros(radiance.shape, np.float32)
     lens = np.zeros_like(frame)
@@ -139,30 +117,26 @@ def put_on(
             continue
         away = np.linalg.norm(curve - view.centre, axis=1)
         at = np.clip(pixels.astype(int), 0, [depth.shape[1] - 1, depth.shape[0] - 1])
-        seen = away < depth[at[:, 1], at[:, 0]] + 0.002
+        before = away < depth[at[:, 1], at[:, 0]] + 0.002
         width = thick * view.camera.mean_focal_length() / distance
-        seen_curve = SeenCurve(pixels, width, seen * solid, closed)
-        where, shade = _drawn(radiance.shape[:2], seen_curve, glasses, light, rng)
+        curve = SeenCurve(pixels, width, before * solid, closed)
+        where, shade = _drawn(radiance.shape[:2], curve, glasses, light, rng)
         frame, colour = frame + where * (1 - frame), colour * (1 - where[..., None]) + shade * where[..., None]
         if closed:
-            lens = np.maximum(lens, _filled(radiance.shape[:2], pixels))
+            lens = np.maximum(lens, fill_outline(radiance.shape[:2], pixels))
     colour = colour / np.maximum(frame, 1e-4)[..., None]
-    away = rng.normal(0, 0.012, 2) * len(frame) + [0, 0.01 * len(frame)]
-    shadow = cv2.GaussianBlur(
-        cv2.warpAffine(frame, np.float32([[1, 0, away[0]], [0, 1, away[1]]]), frame.shape[::-1]),
-        (0, 0),
-        rng.uniform(0.6, 3),
-    )
-    picture = radiance * (
-        1 - (rng.random() < 0.6) * rng.uniform(0.1, 0.6) * shadow[..., None] * (1 - lens[..., None] * 0.3)
-    )
-    passes = np.float32(glasses.passes)
-    picture = picture * (1 + lens[..., None] * (passes - 1)) + lens[..., None] * _reflected(frame.shape, light, rng)
-    return picture * (1 - frame[..., None]) + colour * frame[..., None]
+    x, y = rng.normal(0, 0.012, 2) * len(frame) + [0, 0.01 * len(frame)]
+    shadow = cv2.warpAffine(frame, np.float32([[1, 0, x], [0, 1, y]]), frame.shape[::-1])
+    shadow = cv2.GaussianBlur(shadow, (0, 0), rng.uniform(0.6, 3))[..., None]
+    lens, frame = lens[..., None], frame[..., None]
+    picture = radiance * (1 - (rng.random() < 0.6) * rng.uniform(0.1, 0.6) * shadow * (1 - lens * 0.3))
+    reflected = _reflected(frame.shape[:2], light, rng)
+    picture = picture * (1 + lens * (np.float32(glasses.passes) - 1)) + lens * reflected
+    return picture * (1 - frame) + colour * frame
 
 
 def _curves(glasses: Glasses) -> list[tuple]:
-    """(curve, closed, thickness, opacity along it), from the back to the front."""
+    """Return (curve, closed, thickness, opacity along it) of each part, from the back to the front."""
     bridge, *others = glasses.bars
     return [
         *((bar, False, glasses.bar, np.ones(len(bar))) for bar in others),
@@ -173,8 +147,11 @@ def _curves(glasses: Glasses) -> list[tuple]:
 
 @dataclass(frozen=True)
 class SeenCurve:
-    """A curve of a frame in a picture: pixels [N, 2]; width [N] in pixels; solid [N]: its opacity, 0 where the head
-    hides it; closed: whether its end is its beginning."""
+    """A curve of a frame in a picture.
+
+    pixels [N, 2]; width [N] in pixels; solid [N]: its opacity, 0 where the head hides it; closed: its end is its
+    beginning.
+    """
 
     pixels: np.ndarray
     width: np.ndarray
@@ -185,7 +162,7 @@ class SeenCurve:
 def _drawn(
     shape: tuple, curve: SeenCurve, glasses: Glasses, light: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How much of each pixel [H, W] a curve covers, and its radiance there [H, W, 3]."""
+    """Draw a curve; return its cover [H, W] and its radiance there [H, W, 3]."""
     big = (shape[0] * OVER, shape[1] * OVER)
     where, shade = np.zeros(big, np.float32), np.zeros((*big, 3), np.float32)
     pixels, solid, count = curve.pixels, curve.solid, len(curve.pixels)
@@ -206,25 +183,14 @@ def _drawn(
         cv2.line(shade, points[step].tolist(), points[other].tolist(), value, thick + 2)
         if thick > 3:
             shift = np.round(lean * thick).astype(int)
-            cv2.line(
-                shade,
-                (points[step] + shift).tolist(),
-                (points[other] + shift).tolist(),
-                (np.array(value) * edge).tolist(),
-                thick // 3,
-            )
+            begin, end = (points[step] + shift).tolist(), (points[other] + shift).tolist()
+            cv2.line(shade, begin, end, (np.array(value) * edge).tolist(), thick // 3)
     size = shape[::-1]
     return cv2.resize(where, size, interpolation=cv2.INTER_AREA), cv2.resize(shade, size, interpolation=cv2.INTER_AREA)
 
 
-def _filled(shape: tuple, outline: np.ndarray) -> np.ndarray:
-    mask = np.zeros(shape, np.uint8)
-    cv2.fillPoly(mask, [np.round(16 * (outline - 0.5)).astype(np.int32)], 255, cv2.LINE_AA, 4)
-    return mask.astype(np.float32) / 255
-
-
 def _reflected(shape: tuple, light: float, rng: np.random.Generator) -> np.ndarray:
-    """What a lens mirrors [H, W, 3]: little, or a window's edge."""
+    """Draw the reflection in a lens [H, W, 3]: little, or a window's edge."""
     tint = np.exp(rng.normal(0, 0.15, 3)).astype(np.float32)
     base = np.full(shape, rng.uniform(0, 0.03) * light, np.float32)
     if rng.random() < 0.45:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where hair takes root: densities in hairs per mm^2 over the template's texels, carried to a person's own skin."""
+"""Roots of hair: densities in hairs per mm^2 over the template's texels, carried to a person's own skin."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from core.face import template
 from core.face.strands import Roots
 from core.geometry import raster
-from core.geometry.meshes import Mesh, vertex_normals
+from core.geometry.meshes import Mesh, unit, vertex_normals
 
 from ..canvas import Canvas, canvas
 from ..skin import GROUND
@@ -21,8 +21,7 @@ from ..spots import strew
 
 @dataclass(frozen=True)
 class Ground:
-    """position [N, 3] metres and normal [N, 3] of a person's skin under each texel of the template's canvas of GROUND
-    texels."""
+    """A person's skin under each texel of the canvas of GROUND texels: position [N, 3] in metres, normal [N, 3]."""
 
     canvas: Canvas
     position: np.ndarray
@@ -30,45 +29,27 @@ class Ground:
 
 
 def ground_of(skin: Mesh) -> Ground:
-    """Of a person's closed head, in the template's topology."""
+    """Return the ground of a person's closed head, in the template's topology."""
     on, (face, bary) = canvas(GROUND), _texels()
-    normals = raster.interpolate(vertex_normals(skin), skin.faces, face, bary)
-    return Ground(
-        on,
-        raster.interpolate(skin.vertices, skin.faces, face, bary),
-        normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9),
+    position, normal = (
+        raster.interpolate(values, skin.faces, face, bary) for values in (skin.vertices, vertex_normals(skin))
     )
+    return Ground(on, position, unit(normal))
 
 
-def strew_roots(ground: Ground, density: np.ndarray, way: np.ndarray, rng: np.random.Generator) -> Roots:
-    """Roots of hairs, strewn over the skin at random.
+def strew_roots(ground: Ground, density: np.ndarray, way: np.ndarray, spread: float, rng: np.random.Generator) -> Roots:
+    """Strew roots of hairs at random.
 
-    Parameters
-    ----------
-    ground : of the head
-    density : [N], hairs per mm^2
-    way : [N, 3], along which hairs lie: the template's axes, any length, flattened onto the skin
-    rng : of their places
+    density [N]: hairs per mm^2; way [N, 3]: direction of hairs, in the template's axes, any length, flattened onto the
+    skin and turned about its normal by a deviation of `spread` radians.
     """
     at, texel = strew(ground.canvas, density, rng)
     offset = (at - ground.canvas.position[texel]) / 1000
     normal = ground.normal[texel]
     position = ground.position[texel] + offset - (offset * normal).sum(1, keepdims=True) * normal
-    return Roots(position, normal, _flat(way[texel], normal), at)
-
-
-def turned(roots: Roots, radians: np.ndarray) -> Roots:
-    """The same roots with their directions turned about the skin's normal by `radians` [M]."""
-    c, s = np.cos(radians)[:, None], np.sin(radians)[:, None]
-    return Roots(
-        roots.position, roots.normal, c * roots.direction + s * np.cross(roots.normal, roots.direction), roots.at
-    )
-
-
-def _flat(way: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """The part of directions [M, 3] across the normals [M, 3], unit."""
-    flat = way - (way * normal).sum(1, keepdims=True) * normal
-    return flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9)
+    flat = unit(way[texel] - (way[texel] * normal).sum(1, keepdims=True) * normal)
+    turn = rng.normal(0, spread, (len(at), 1))
+    return Roots(position, normal, np.cos(turn) * flat + np.sin(turn) * np.cross(normal, flat), at)
 
 
 @cache

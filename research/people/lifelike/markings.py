@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What may be on a skin beyond the plausible, drawn into a picture as logarithms of factors of the albedo: a delighter
-must not take it for light."""
+"""Markings beyond the plausible, as logarithms of albedo factors: a delighter must not take them for light."""
 
 from __future__ import annotations
 
@@ -12,8 +11,11 @@ HARD = 0.3  # of a stain's softness, from 0.02 to 1: below, its edge is as sharp
 
 
 def stains(side: int, rng: np.random.Generator) -> np.ndarray:
-    """Patches of another colour [S, S, 3] as logarithms: port-wine stains, vitiligo, paint. Those with a hard edge are
-    dyes, which leave one colour channel as it is: a grey patch with a hard edge is what a leaf's shadow looks like."""
+    """Draw patches of another colour [S, S, 3] as logarithms: port-wine stains, vitiligo, paint.
+
+    Those with a hard edge are dyes, which leave one colour channel as it is: a grey patch with a hard edge looks like a
+    leaf's shadow.
+    """
     count = int(rng.integers(3, 14))
     field = cv2.resize(rng.normal(0, 1, (count, count)).astype(np.float32), (side, side), interpolation=cv2.INTER_CUBIC)
     softness = np.exp(rng.uniform(np.log(0.02), np.log(1.0)))
@@ -25,32 +27,23 @@ def stains(side: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def moles(side: int, rng: np.random.Generator) -> np.ndarray:
-    """Dark and light spots [S, S, 3] of all sizes as logarithms."""
+    """Draw dark and light spots [S, S, 3] of all sizes as logarithms."""
     log = np.zeros((side, side, 3), np.float32)
     for _ in range(int(rng.integers(2, 40))):
         spot = np.zeros((side, side), np.uint8)
         at, radius = rng.uniform(0.1, 0.9, 2) * side, np.exp(rng.uniform(np.log(0.5), np.log(6.0)))
-        axes = (radius * np.exp(rng.normal(0, 0.2, 2)) * 16).astype(int)
-        cv2.ellipse(
-            spot,
+        axes, middle = (
+            (radius * np.exp(rng.normal(0, 0.2, 2)) * 16).astype(int).tolist(),
             (at * 16).astype(int).tolist(),
-            axes.tolist(),
-            float(rng.uniform(0, 180)),
-            0,
-            360,
-            255,
-            -1,
-            cv2.LINE_AA,
-            4,
         )
+        cv2.ellipse(spot, middle, axes, float(rng.uniform(0, 180)), 0, 360, 255, -1, cv2.LINE_AA, 4)
         tint = rng.normal(-0.5, 0.4) + rng.normal(0, 0.1, 3)
         log += (spot.astype(np.float32) / 255)[..., None] * tint.astype(np.float32)
     return np.clip(log, -1.6, 1.0)
 
 
 def tufts(side: int, landmarks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Tufts of short hairs anywhere on a face [S, S, 3] as logarithms, dense or sparse, dark or fair: what a brow is,
-    where no brow is."""
+    """Draw tufts of short hairs anywhere on a face [S, S, 3] as logarithms: brows where no brow is."""
     log = np.zeros((side, side, 3), np.float32)
     low, high = landmarks.min(0), landmarks.max(0)
     face = float((high - low).max())

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What moves while a phone films: the head that sways on its neck, the picture that smears while a row is exposed, rows
-that are read one after the other."""
+"""Motion while a phone films: the head's sway, the smear of an exposure, rows read one after the other."""
 
 from __future__ import annotations
 
@@ -20,22 +19,11 @@ FAR_M = 1.6  # what is behind the person
 
 
 def sample_sway(frames: int, millimetres: float, degrees: float, rng: np.random.Generator) -> np.ndarray:
-    """The head of a person who keeps still as well as people do: smooth motion of mean zero about the neck.
+    """Draw head-to-world matrices [frames, 4, 4] in metres of a person who keeps still as well as people do.
 
-    Parameters
-    ----------
-    frames : their number
-    millimetres : deviation of the place, per axis
-    degrees : deviation of the turn, per axis
-    rng : of the motion
-
-    Returns
-    -------
-    Head-to-world matrices [frames, 4, 4], in metres.
+    Smooth motion of mean zero about the neck; deviations per axis in millimetres and degrees.
     """
-    path = gaussian_filter1d(rng.normal(size=(frames + 8 * PERIOD, 6)), PERIOD, axis=0)[
-        4 * PERIOD : 4 * PERIOD + frames
-    ]
+    path = gaussian_filter1d(rng.normal(size=(frames + 8 * PERIOD, 6)), PERIOD, axis=0)[4 * PERIOD : -4 * PERIOD]
     path = (path - path.mean(0)) / np.maximum(path.std(0), 1e-9)
     turn = Rotation.from_rotvec(np.radians(degrees) * path[:, :3]).as_matrix()
     poses = np.tile(np.eye(4), (frames, 1, 1))
@@ -44,24 +32,15 @@ def sample_sway(frames: int, millimetres: float, degrees: float, rng: np.random.
     return poses
 
 
-def measure_image_motion(
-    caster: raster.RayCaster, views: tuple[View, View, View], poses: np.ndarray, coarse: float = 0.125
-) -> np.ndarray:
-    """How far each pixel of the middle view moves in a frame's time; all but the head stands still.
+def measure_image_motion(caster: raster.RayCaster, views: tuple[View, View, View], poses: np.ndarray) -> np.ndarray:
+    """Return the motion of each pixel of the middle view in a frame's time, float32 [H, W, 2] in pixels.
 
-    Parameters
-    ----------
-    caster : of the head, in its own axes
-    views : of the frame before, of this one and of the one after, in the world
-    poses : [3, 4, 4], head to world in these frames
-    coarse : of the view's size, at which it is worked out
-
-    Returns
-    -------
-    float32 [H, W, 2], x and y in pixels.
+    All but the head stands still. caster: of the head, in its own axes; views: of the frame before, this one and the
+    one after, in the world; poses [3, 4, 4]: head to world. Computed at an eighth
+    of the size.
     """
     before, now, after = views
-    width, height = round(now.width * coarse), round(now.height * coarse)
+    width, height = round(now.width / 8), round(now.height / 8)
     y, x = np.mgrid[0:height, 0:width]
     pixels = (np.stack([x.ravel(), y.ravel()], -1) + 0.5) * [now.width / width, now.height / height]
     rays = now.rays(pixels)
@@ -71,33 +50,31 @@ def measure_image_motion(
     )
     head = np.isfinite(depth)
     points = now.centre + rays * np.where(head, depth, FAR_M)[:, None]
-    moved = []
+    ends = []
     for view, pose in ((before, poses[0]), (after, poses[2])):
         step = pose @ back
-        moved.append(view.project(np.where(head[:, None], points @ step[:3, :3].T + step[:3, 3], points))[0])
-    flow = ((moved[1] - moved[0]) / 2).reshape(height, width, 2).astype(np.float32)
+        ends.append(view.project(np.where(head[:, None], points @ step[:3, :3].T + step[:3, 3], points))[0])
+    flow = ((ends[1] - ends[0]) / 2).reshape(height, width, 2).astype(np.float32)
     return cv2.resize(flow, (now.width, now.height), interpolation=cv2.INTER_LINEAR)
 
 
 def rolling_shutter(picture: np.ndarray, flow: np.ndarray, readout: float) -> np.ndarray:
-    """A picture [H, W, C] whose rows are read during `readout` of a frame's time, the middle one on time; flow [H, W,
-    2] in pixels per frame."""
+    """Read a picture's rows during `readout` of a frame's time, the middle one on time.
+
+    picture [H, W, C]; flow [H, W, 2] in pixels per frame.
+    """
     rows = (np.arange(len(picture)) + 0.5) / len(picture) - 0.5
     return shifted(picture, flow * (readout * rows)[:, None, None])
 
 
 def motion_blur(picture: np.ndarray, flow: np.ndarray, shutter: float) -> np.ndarray:
-    """The mean of a picture [H, W, C] over an exposure of `shutter` of a frame's time, along the flow [H, W, 2] in
-    pixels per frame."""
-    return np.mean(
-        [shifted(picture, flow * t) for t in shutter * (np.arange(TAPS) + 0.5 - TAPS / 2) / TAPS],
-        axis=0,
-        dtype=np.float32,
-    )
+    """Average a picture [H, W, C] along the flow [H, W, 2] over an exposure of `shutter` of a frame's time."""
+    times = shutter * (np.arange(TAPS) + 0.5 - TAPS / 2) / TAPS
+    return np.mean([shifted(picture, flow * t) for t in times], axis=0, dtype=np.float32)
 
 
 def shifted(picture: np.ndarray, by: np.ndarray) -> np.ndarray:
-    """The picture with what is at x moved to x + by, [H, W, 2] in pixels."""
+    """Move what is at x to x + by, [H, W, 2] in pixels."""
     y, x = np.mgrid[0 : picture.shape[0], 0 : picture.shape[1]]
     from_x, from_y = (x - by[..., 0]).astype(np.float32), (y - by[..., 1]).astype(np.float32)
     return cv2.remap(picture, from_x, from_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).reshape(picture.shape)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What one person is, by seed: the skin's parameters and all that the bald subjects lack."""
+"""One person, by seed: the skin's parameters and all that the bald subjects lack."""
 
 from __future__ import annotations
 
@@ -25,15 +25,17 @@ BEARD = ("none", "stubble", "moustache", "full")
 
 @dataclass(frozen=True)
 class Person:
-    """skin: parameters of the bare skin, without painted hair; iris: linear albedo [3]; openness of the lids in [0, 1],
-    gaze [2] in degrees (left, up); hair and beard: of HAIR and BEARD, with their lengths in metres; colours: linear
-    albedo; grey: share of hairs without pigment; brow: density, 1 is usual; fringe: whether hair falls over the
-    forehead; parting: x in metres; clothes: linear albedo of the shirt [3] and its collar (crew, v); shade, tan:
-    strength of the beard's shade and of tan lines in [0, 1]."""
+    """A person's parameters.
+
+    skin: of the bare skin, without painted hair; iris: linear albedo [3]; openness of the lids in [0, 1], gaze [2] in
+    degrees (left, up); hair and beard: of HAIR and BEARD, with their lengths in metres; colours: linear albedo; grey:
+    share of hairs without pigment; brow: density, 1 is usual; fringe: True if hair falls over the forehead; parting: x
+    in metres; clothes: linear albedo of the shirt [3] and its collar (crew, v); shade, tan: strength of the beard's
+    shade and of tan lines in [0, 1].
+    """
 
     seed: int
     skin: SkinParameters
-    male: bool
     iris: tuple[float, float, float]
     openness: float
     gaze: tuple[float, float]
@@ -55,7 +57,7 @@ class Person:
 
 
 def sample_person(seed: int) -> Person:
-    """A person at random; skin tone, age and marks are those of the bald subject of the same seed."""
+    """Draw a person; skin tone, age and marks are those of the bald subject of the same seed."""
     rng = np.random.default_rng([seed, 61])
     skin = adorned(sample_parameters(seed), seed)
     male = skin.beard > 0
@@ -74,7 +76,6 @@ def sample_person(seed: int) -> Person:
     return Person(
         seed=seed,
         skin=bare,
-        male=male,
         iris=_tuple(iris * np.exp(rng.normal(0, 0.2))),
         openness=0.0 if rng.random() < 0.2 else float(rng.uniform(0.72, 0.98)),
         gaze=(float(np.clip(rng.normal(0, 3), -6, 6)), float(np.clip(rng.normal(0, 2), -4, 4))),

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From linear light to what a phone stores: exposure, noise, noise reduction, tone curve, local contrast, sharpening
-with its halo, compression.
+"""A phone's processing of linear light: exposure, noise, noise reduction, tone curve, local contrast, sharpening.
 
 Each step is a function of a picture float32 [H, W, 3] and of its own parameters; `develop` does them in a phone's
-order. What moves is in motion.py.
+order. Motion is in motion.py.
 """
 
 from __future__ import annotations
@@ -19,11 +18,14 @@ from ..pigment import LUMINANCE
 
 @dataclass(frozen=True)
 class Phone:
-    """shot, read: the noise's variance is shot x signal + read^2, linear; reduction: strength of noise reduction in [0,
+    """A phone's parameters.
+
+    shot, read: the noise's variance is shot x signal + read^2, linear; reduction: strength of noise reduction in [0,
     1]; contrast: of the tone curve, 0 is none; shoulder: sRGB level from which highlights are rolled off; local: local
     contrast, and its radius as a share of the height; sharpening, and its radius in pixels; crf: of H.264; readout,
     shutter: share of a frame's time in which the rows are read one after the other, and in which each is exposed;
-    sway_mm, sway_degrees: deviations of the head's place and turn."""
+    sway_mm, sway_degrees: deviations of the head's place and turn.
+    """
 
     shot: float
     read: float
@@ -42,7 +44,7 @@ class Phone:
 
 
 def sample_phone(seed: int) -> Phone:
-    """A phone at random, from a plain one in good light to a heavy hand in the dark."""
+    """Draw a phone, from a plain one in good light to a heavy hand in the dark."""
     rng = np.random.default_rng([seed, 70])
     noise = np.exp(rng.uniform(np.log(0.002), np.log(0.012)))
     return Phone(
@@ -64,18 +66,9 @@ def sample_phone(seed: int) -> Phone:
 
 
 def develop(linear: np.ndarray, phone: Phone, gain: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The picture that a phone makes of a scene. Compression is left to what stores it.
+    """Develop scene light [H, W, 3] as a phone does, but for compression: sRGB float32 [H, W, 3] in [0, 1].
 
-    Parameters
-    ----------
-    linear : [H, W, 3], the scene's light
-    phone : how it does so
-    gain : [3], exposure and white balance
-    rng : of the sensor's noise
-
-    Returns
-    -------
-    sRGB, float32 [H, W, 3] in [0, 1].
+    gain [3]: exposure and white balance.
     """
     sensed = np.clip(add_noise(np.clip(linear * gain, 0, 4), phone.shot, phone.read, rng), 0, None)
     picture = tone(reduce_noise(sensed, phone.reduction, phone.shot, phone.read), phone.contrast, phone.shoulder)
@@ -84,29 +77,16 @@ def develop(linear: np.ndarray, phone: Phone, gain: np.ndarray, rng: np.random.G
 
 
 def add_noise(linear: np.ndarray, shot: float, read: float, rng: np.random.Generator) -> np.ndarray:
-    """A sensor's noise: photons and reading, of variance shot x signal + read^2.
-
-    Parameters
-    ----------
-    linear : [...], the signal
-    shot : variance per signal
-    read : deviation without light
-    rng : of the noise
-    """
-    return (
-        linear + rng.standard_normal(linear.shape, np.float32) * np.sqrt(shot * np.maximum(linear, 0) + read**2)
-    ).astype(np.float32)
+    """Add a sensor's noise of variance shot x signal + read^2 to a linear signal [...]."""
+    deviation = np.sqrt(shot * np.maximum(linear, 0) + read**2)
+    return (linear + rng.standard_normal(linear.shape, np.float32) * deviation).astype(np.float32)
 
 
 def reduce_noise(linear: np.ndarray, strength: float, shot: float, read: float) -> np.ndarray:
-    """Noise reduction that keeps edges (bilateral, in the space where the noise is even): fine texture goes with the
-    noise.
+    """Reduce noise but keep edges; fine texture goes with the noise.
 
-    Parameters
-    ----------
-    linear : [H, W, 3]
-    strength : in [0, 1], the reduced picture's share
-    shot, read : of the noise, as in `add_noise`
+    Bilateral, in the space where the noise is even. linear [H, W, 3]; strength in [0, 1]: the reduced picture's share;
+    shot, read as in `add_noise`.
     """
     if strength <= 0:
         return linear
@@ -118,8 +98,11 @@ def reduce_noise(linear: np.ndarray, strength: float, shot: float, read: float) 
 
 
 def tone(linear: np.ndarray, contrast: float, shoulder: float) -> np.ndarray:
-    """Linear [..., 3] to sRGB under a phone's curve: more contrast about the middle (0, 1/2 and 1 stay, the slope at
-    1/2 is 1 + contrast / 2), and a shoulder from which brighter light approaches white instead of clipping."""
+    """Encode linear [..., 3] as sRGB under a phone's curve.
+
+    More contrast about the middle (0, 1/2 and 1 stay, the slope at 1/2 is 1 + contrast / 2), and a shoulder from which
+    brighter light approaches white instead of clipping.
+    """
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
     over = np.maximum(srgb - shoulder, 0) / (1 - shoulder)
     srgb = np.where(srgb > shoulder, shoulder + (1 - shoulder) * over / (1 + over), srgb)
@@ -128,8 +111,7 @@ def tone(linear: np.ndarray, contrast: float, shoulder: float) -> np.ndarray:
 
 
 def with_local_contrast(srgb: np.ndarray, amount: float, radius: float) -> np.ndarray:
-    """What differs from its surroundings (a Gaussian of `radius` pixels on the luma) by 1 + amount as much; brighter
-    and darker, not more colourful."""
+    """Multiply by 1 + amount the luma's difference from its surroundings, a Gaussian of `radius` pixels."""
     if amount <= 0:
         return srgb
     luma = (srgb @ LUMINANCE).astype(np.float32)
@@ -137,12 +119,15 @@ def with_local_contrast(srgb: np.ndarray, amount: float, radius: float) -> np.nd
 
 
 def sharpened(srgb: np.ndarray, amount: float, radius: float) -> np.ndarray:
-    """Unsharp masking: an edge of height h overshoots by up to amount x h / 2 on either side within `radius` pixels."""
+    """Sharpen by unsharp masking.
+
+    An edge of height h overshoots by up to amount x h / 2 on either side within `radius` pixels.
+    """
     return srgb + amount * (srgb - cv2.GaussianBlur(srgb, (0, 0), radius)) if amount > 0 else srgb
 
 
 def compressed(srgb: np.ndarray, quality: int) -> np.ndarray:
-    """What JPEG leaves of a picture, [H, W, 3] in [0, 1]; quality 1 ... 100."""
+    """Return a picture [H, W, 3] in [0, 1] as JPEG of a quality from 1 to 100 stores it."""
     pixels = np.round(255 * np.clip(srgb, 0, 1)).astype(np.uint8)
     stored = cv2.imencode(".jpg", np.ascontiguousarray(pixels[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
     return cv2.imdecode(stored, cv2.IMREAD_COLOR)[..., ::-1].astype(np.float32) / 255

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a camera sees of a person with all that any light needs, made once per figure and kept, so that portraits.py can
-put any number of lights on it."""
+"""Views of a person with all that any light needs, made once per figure and kept, for portraits.py."""
 
 from __future__ import annotations
 
@@ -12,12 +11,11 @@ import numpy as np
 
 from core.capture.files import replacing
 from core.geometry import raster
-from core.geometry.meshes import vertex_normals
+from core.geometry.meshes import unit, vertex_normals
 from core.geometry.views import View
 from core.light.skylight import radiance_transfer
 
 from .figure import Figure
-from .truth import Scene
 from .unlit import Unlit, random_view, scene_of, trace_unlit
 
 SIDE = 256
@@ -27,10 +25,12 @@ RAYS = 160
 
 @dataclass(frozen=True)
 class RelightableView:
-    """A sight of a person with what any light needs. unlit: what is seen; position float16 [S, S, 3] of it in metres
-    about the head's middle; and of the bare head alone, as a capture would register it: here bool [S, S], normal int8
-    [S, S, 3] of 127, transfer float16 [S, S, 9] of the sky's coefficients and reach uint8 [S, S, LAMPS] of 255, what it
-    lets through to itself."""
+    """View of a person with what any light needs.
+
+    position float16 [S, S, 3] of what is visible, in metres about the head's middle; and of the bare head alone, as a
+    capture would register it: here bool [S, S], normal int8 [S, S, 3] of 127, transfer float16 [S, S, 9] of the sky's
+    coefficients and reach uint8 [S, S, LAMPS] of 255: the share of a lamp that passes the head.
+    """
 
     unlit: Unlit
     position: np.ndarray
@@ -41,24 +41,23 @@ class RelightableView:
 
 
 class Sitter:
-    """A figure before the camera: what its views share is worked out once."""
+    """A figure before the camera: what its views share is computed once."""
 
     def __init__(self, figure: Figure, rng: np.random.Generator):
-        self.scene: Scene = scene_of(figure, rng)
+        self.scene = scene_of(figure, rng)
         self.bald = raster.RayCaster(figure.head)
         self.normals = vertex_normals(figure.head)
         self.transfer = radiance_transfer(self.bald, figure.head.vertices, self.normals, RAYS)
 
     def stage(self, rng: np.random.Generator) -> RelightableView:
-        """A sight from anywhere before the person."""
+        """Return a view from anywhere before the person."""
         view = random_view(self.scene.figure, rng, SIDE, rng.uniform(CLOSEST, WIDEST))
         unlit = trace_unlit(self.scene, view, rng)
         mesh = self.bald.mesh
         face, bary, _ = raster.render_view(self.bald, view, 1)
         here = face >= 0
         normal, transfer, reach = (np.zeros((*here.shape, n), np.float32) for n in (3, 9, len(unlit.lamps)))
-        towards = raster.interpolate(self.normals, mesh.faces, face[here], bary[here])
-        towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
+        towards = unit(raster.interpolate(self.normals, mesh.faces, face[here], bary[here]))
         points = raster.interpolate(mesh.vertices, mesh.faces, face[here], bary[here]) + 1e-3 * towards
         normal[here], transfer[here] = towards, raster.interpolate(self.transfer, mesh.faces, face[here], bary[here])
         for k, lamp in enumerate(unlit.lamps):
@@ -90,4 +89,4 @@ def save(path: Path, stage: RelightableView) -> None:
 def load(path: Path) -> RelightableView:
     with np.load(path, allow_pickle=False) as stored:
         unlit = Unlit(**{f.name: stored[f"unlit_{f.name}"] for f in fields(Unlit)})
-        return RelightableView(unlit, **{f.name: stored[f.name] for f in fields(RelightableView) if f.name != "unlit"})
+        return RelightableView(unlit, **{name: stored[name] for name in stored if not name.startswith("unlit_")})

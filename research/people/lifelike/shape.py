@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head that registration's identity basis cannot reach: a member of the basis plus a smooth, mostly symmetric
-displacement from which everything that the basis or a motion of the head explains has been taken.
+"""A head beyond registration's identity basis: a member of it plus a smooth, mostly symmetric displacement.
 
-The displacement is a random field and, where its folder is given, one of ICT-FaceKit's identities as well (facekit.py).
+What the basis or a motion of the head explains is taken from the displacement. It is a random field and, where its
+folder is given, one of ICT-FaceKit's identities as well (facekit.py).
 """
 
 from __future__ import annotations
@@ -31,59 +31,56 @@ RESIDUAL_MM = 2.05, 2.3  # root mean square over the face that the basis leaves
 
 
 def person_mesh(seed: int, facekit: Path | None = None) -> Mesh:
-    """The closed head of a person in the template's topology and pose: metres, +Z up, face towards -Y."""
+    """Return a person's closed head in the template's topology and pose: metres, +Z up, face towards -Y."""
     rng = np.random.default_rng([seed, 60])
     basis = np.tensordot(WITHIN * identity_coefficients(seed), template.identity(), 1)
-    outside = _unit(_lessened(_random_field(rng)))
+    outside = _lessened(_random_field(rng))
     if facekit:
-        outside = (1 - FACEKIT) * outside + FACEKIT * _unit(_lessened(_from_facekit(facekit, rng)))
+        outside = (1 - FACEKIT) * outside + FACEKIT * _lessened(_from_facekit(facekit, rng))
     outside *= rng.uniform(*RESIDUAL_MM) / 1000 / root_mean_square(unexplained(outside))
     return template.load().moved(template.load().vertices + basis + outside)
 
 
 def unexplained(displacement: np.ndarray) -> np.ndarray:
-    """The part of a displacement [V, 3] of the template that no identity, rotation, translation or scale explains, by
-    least squares over the face."""
+    """Return the part of a displacement [V, 3] that no identity, rotation, translation or scale explains.
+
+    By least squares over the face.
+    """
     return _without_basis(displacement, face_weight())
 
 
 def _lessened(displacement: np.ndarray) -> np.ndarray:
-    """The smallest displacement over the whole head that a basis fit to the face leaves as much of: what the basis
-    explains may go, but so that the back of the head stays where it is."""
-    return _without_basis(displacement, 0.25 + 0.75 * face_weight())
+    """Return the smallest displacement of the whole head that a basis fit to the face leaves as much of.
 
-
-def _unit(displacement: np.ndarray) -> np.ndarray:
-    return displacement / root_mean_square(unexplained(displacement))
+    What the basis explains may go, but so that the back of the head stays where it is. Scaled to leave a root mean
+    square of 1.
+    """
+    lessened = _without_basis(displacement, 0.25 + 0.75 * face_weight())
+    return lessened / root_mean_square(unexplained(lessened))
 
 
 def _without_basis(displacement: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """A displacement [V, 3] less its least-squares fit by the design, vertices counted by weight [V]."""
+    """Subtract from a displacement [V, 3] its least-squares fit by the design, vertices counted by weight [V]."""
     design, root = _design(), np.sqrt(weight)
     system = (design * root[:, None, None]).reshape(3 * len(root), -1)
     return displacement - design @ np.linalg.lstsq(system, (displacement * root[:, None]).reshape(-1), rcond=None)[0]
 
 
 def root_mean_square(displacement: np.ndarray) -> float:
-    """Of the lengths of a displacement [V, 3], over the face."""
+    """Return the root mean square of a displacement's lengths [V, 3] over the face."""
     weight = face_weight()
     return float(np.sqrt((weight * (displacement**2).sum(1)).sum() / weight.sum()))
 
 
 @cache
 def face_weight() -> np.ndarray:
-    """How far each vertex of the template belongs to the face, [V] in [0, 1]."""
-    mesh = template.load()
-    return _at_vertices(mesh, template.mask("face", 512))
-
-
-def _at_vertices(mesh: Mesh, picture: np.ndarray) -> np.ndarray:
-    return raster.sample_uv(picture, vertex_uvs(mesh)).astype(np.float64)
+    """Return the share [V] in [0, 1] to which each vertex of the template belongs to the face."""
+    return raster.sample_uv(template.mask("face", 512), vertex_uvs(template.load())).astype(np.float64)
 
 
 @cache
 def _design() -> np.ndarray:
-    """The displacements [V, 3, 7 + K] of small rotations, translations, a scale and the identities."""
+    """Return the displacements [V, 3, 7 + K] of small rotations, translations, a scale and the identities."""
     points = template.load().vertices
     turns = [np.cross(np.eye(3)[axis], points) for axis in range(3)]
     moves = [np.broadcast_to(np.eye(3)[axis], points.shape) for axis in range(3)]
@@ -91,14 +88,13 @@ def _design() -> np.ndarray:
 
 
 def _random_field(rng: np.random.Generator) -> np.ndarray:
-    """A displacement [V, 3] without a scale, features of WAVELENGTHS_MM."""
+    """Draw a displacement [V, 3] without a scale, with features of WAVELENGTHS_MM."""
     points = 1000 * template.load().vertices
     mirrored = points * [-1, 1, 1]
 
     def field(at: np.ndarray, seed: int) -> np.ndarray:
-        return np.stack(
-            [octaves(at, WAVELENGTHS_MM, np.random.default_rng([seed, axis]), smooth=True) for axis in range(3)], 1
-        )
+        rngs = [np.random.default_rng([seed, axis]) for axis in range(3)]
+        return np.stack([octaves(at, WAVELENGTHS_MM, rng, smooth=True) for rng in rngs], 1)
 
     even, odd = rng.integers(2**31, size=2)
     symmetric = field(points, even) + field(mirrored, even) * [-1, 1, 1]
@@ -107,7 +103,7 @@ def _random_field(rng: np.random.Generator) -> np.ndarray:
 
 
 def _from_facekit(folder: Path, rng: np.random.Generator) -> np.ndarray:
-    """A random combination [V, 3] of ICT-FaceKit's identities, weighted anew on each side of the face."""
+    """Draw a combination [V, 3] of ICT-FaceKit's identities, weighted anew on each side of the face."""
     shapes = fields(folder)
     side = np.tanh(template.load().vertices[:, 0] / 0.03)[None, :, None]
     even, odd = rng.normal(size=(2, len(shapes), 1, 1))

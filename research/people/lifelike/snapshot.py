@@ -1,10 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A photograph of what unlit.py saw: other colours, a sky and up to two lamps, a background, what covers a face, and a
-phone's processing.
+"""A photograph of an unlit view: other colours, sky and lamps, background, clutter, and a phone's processing.
 
-Colours are varied far beyond the figures' own: a parser is to know hair by where it is and how it looks, not by how
-dark it is.
+Colours are varied far beyond the figures' own: a parser is to know hair by its place and look, not by its darkness.
 """
 
 from __future__ import annotations
@@ -16,10 +14,8 @@ import numpy as np
 
 from core.face.parts import PARTS
 from core.imaging import images
-from core.light.spherical_harmonics import LAMBERT, per_function, sh_basis
 
-from ..environments import Environment, made_environment, panorama_environment
-from ..olat import BASIS, LIGHTS
+from ..environments import Environment, irradiance, random_environment
 from ..response import curve, develop, expose
 from .clutter import RIMS, cover_person, open_mouth, paint_backdrop
 from .person import BROWS
@@ -44,29 +40,15 @@ SKIN, HAIR, BROW, BEARD, LIPS, CLOTHES = (
 def photograph(
     sight: Unlit, rng: np.random.Generator, panoramas: list[np.ndarray] = (), worn: Callable | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A photograph of a sight.
+    """Photograph a view: sRGB [S, S, 3] and the shares of its parts [S, S, len(PARTS)], float32 in [0, 1].
 
-    Parameters
-    ----------
-    sight : what is seen
-    rng : of colours, light, background, what covers the face, and camera
-    panoramas : as `read_panoramas` gives them; they may light it
-    worn : (radiance [S, S, 3], light) -> radiance puts on what the person wears, of which the shares know nothing;
-        without it some wear the rims of glasses
-
-    Returns
-    -------
-    An sRGB picture [S, S, 3] and the shares of its parts [S, S, len(PARTS)], float32 in [0, 1].
+    panoramas, from `read_panoramas`, may light it. worn(radiance [S, S, 3], light) -> radiance puts on what the person
+    wears, which the shares do not know; without it some wear the rims of glasses.
     """
-    shares = sight.shares.astype(np.float32) / 255
-    shares /= np.maximum(shares.sum(-1, keepdims=True), 1e-6)
+    shares = normalised_shares(sight)
     albedo = recoloured(images.srgb_to_linear(sight.albedo.astype(np.float32) / 255), shares, rng)
     albedo, shares = open_mouth(albedo, shares, sight.landmarks, rng)
-    environment = (
-        panorama_environment(panoramas[rng.integers(len(panoramas))], rng)
-        if len(panoramas) and rng.random() < 0.6
-        else made_environment(rng)
-    )
+    environment = random_environment(panoramas, rng)
     radiance, light = _lit(sight, albedo, shares, environment, rng)
     behind = shares[..., -1:]
     radiance = radiance * (1 - behind) + paint_backdrop(directions(sight), environment, light, rng) * behind
@@ -78,9 +60,14 @@ def photograph(
     return develop(curve(linear, rng), rng), shares
 
 
+def normalised_shares(sight: Unlit) -> np.ndarray:
+    """Return a view's shares, float32 [S, S, len(PARTS)], with sum 1."""
+    shares = sight.shares.astype(np.float32) / 255
+    return shares / np.maximum(shares.sum(-1, keepdims=True), 1e-6)
+
+
 def recoloured(albedo: np.ndarray, shares: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The linear albedo [S, S, 3] with other tones of skin, hair, brows, beard, lips and clothes, each moved as a
-    whole."""
+    """Give the linear albedo [S, S, 3] other tones of skin, hair, brows, beard, lips and clothes."""
     log = np.zeros_like(albedo)
 
     def move(part: int, gain: np.ndarray) -> None:
@@ -111,7 +98,7 @@ def recoloured(albedo: np.ndarray, shares: np.ndarray, rng: np.random.Generator)
 
 
 def weave(size: int, rng: np.random.Generator) -> np.ndarray:
-    """Stripes, checks or blotches [S, S, 1 or 3] as logarithms."""
+    """Draw stripes, checks or blotches [S, S, 1 or 3] as logarithms."""
     y, x = np.mgrid[0:size, 0:size].astype(np.float32)
     turn, wave, strength = rng.uniform(0, np.pi), rng.uniform(3, 30), rng.uniform(0.1, 1.2)
     along, across = x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)
@@ -128,46 +115,34 @@ def weave(size: int, rng: np.random.Generator) -> np.ndarray:
 def _lit(
     sight: Unlit, albedo: np.ndarray, shares: np.ndarray, environment: Environment, rng: np.random.Generator
 ) -> tuple[np.ndarray, float]:
-    """The person's radiance [S, S, 3] and how bright the light is."""
+    """Return the person's radiance [S, S, 3] and the brightness of the light."""
     normal = sight.normal.astype(np.float32) / 127
     towards = -directions(sight)
-    sky = (BASIS.T @ environment.radiance * (4 * np.pi / LIGHTS)).astype(np.float32)
-    lambert = np.float32(per_function(LAMBERT))
+    sky = environment.sky.astype(np.float32)
     free = cv2.GaussianBlur(sight.free.astype(np.float32) / 255, (0, 0), 1.2)[..., None]
-    ambient = np.maximum((sh_basis(normal) * lambert) @ sky, 0.02) * free ** rng.uniform(0.6, 1.3)
+    ambient = np.maximum(irradiance(normal, sky), 0.02) * free ** rng.uniform(0.6, 1.3)
     cosine = np.clip((normal * towards).sum(-1, keepdims=True), 0, 1)
-    mirror = 2 * cosine * normal - towards
     reflectance = shares @ np.float32([GLOSS[name][1] for name in PARTS])[:, None] * rng.uniform(0.4, 2.0)
     rough = shares @ np.float32([GLOSS[name][0] for name in PARTS]) * rng.uniform(0.75, 1.15)
-    shine = np.maximum((sh_basis(mirror) * lambert) @ sky, 0) * free * (reflectance + 0.2 * (1 - cosine) ** 5)
-    light = float(np.mean(ambient[shares[..., -1] < 0.5])) if (shares[..., -1] < 0.5).any() else 1.0
-    diffuse = ambient
-    softness = rng.uniform(0.2, 1.5)
+    mirrored = np.maximum(irradiance(2 * cosine * normal - towards, sky), 0)
+    shine = mirrored * free * (reflectance + 0.2 * (1 - cosine) ** 5)
+    person = shares[..., -1] < 0.5
+    light = float(np.mean(ambient[person])) if person.any() else 1.0
+    diffuse, softness = ambient, rng.uniform(0.2, 1.5)
     for k in range(rng.choice([0, 1, 1, 1, 2])):
-        lamp, strength = sight.lamps[k], np.exp(rng.uniform(np.log(0.3), np.log(8.0)))
-        warm = rng.normal(0.1, 0.25)
+        lamp, strength, warm = sight.lamps[k], np.exp(rng.uniform(np.log(0.3), np.log(8.0))), rng.normal(0.1, 0.25)
         colour = (strength * np.exp([0.6 * warm, rng.normal(0, 0.06), -warm])).astype(np.float32)
         arrives = cv2.GaussianBlur(sight.reach[..., k].astype(np.float32) / 255, (0, 0), softness)
-        facing = np.maximum(normal @ lamp, 0)
-        diffuse = diffuse + (facing * arrives)[..., None] * colour
+        diffuse = diffuse + (np.maximum(normal @ lamp, 0) * arrives)[..., None] * colour
         shine = shine + (shade_highlight(normal, towards, lamp, rough) * arrives)[..., None] * reflectance * colour
         light += 0.4 * float(colour.mean())
     return albedo * diffuse + shine, light
 
 
 def shade_highlight(normal: np.ndarray, towards: np.ndarray, lamp: np.ndarray, rough: np.ndarray) -> np.ndarray:
-    """GGX over the reflectance, times the cosine and pi (Walter et al. 2007).
+    """Return GGX over the reflectance, times the cosine and pi (Walter et al. 2007): [S, S], 60 at most.
 
-    Parameters
-    ----------
-    normal : [S, S, 3], unit
-    towards : [S, S, 3], unit, to the camera
-    lamp : [3], unit direction to it
-    rough : [S, S], roughness
-
-    Returns
-    -------
-    [S, S], 60 at most.
+    normal and towards the camera [S, S, 3], unit; lamp [3]: unit direction; rough [S, S]: roughness.
     """
     half = towards + lamp
     half /= np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), 1e-6)
@@ -179,8 +154,10 @@ def shade_highlight(normal: np.ndarray, towards: np.ndarray, lamp: np.ndarray, r
 
 
 def directions(sight: Unlit) -> np.ndarray:
-    """Unit directions [S, S, 3] from the camera through the pixels, in the head's axes; the principal point lies next
-    to the middle and counts as that."""
+    """Return unit directions [S, S, 3] from the camera through the pixels, in the head's axes.
+
+    The principal point lies next to the middle and counts as that.
+    """
     size = len(sight.albedo)
     y, x = (np.mgrid[0:size, 0:size] + 0.5 - size / 2).astype(np.float32) / sight.focal
     plane = np.stack([x, y, np.ones_like(x)], -1)

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Broad pigment of a face: flushed cheeks, nose and ears, darker brows and lips' surroundings, tan lines of hats,
-glasses and collars, sallow or ruddy parts.
+"""Broad pigment of a face: flushed cheeks, nose and ears, tan lines, sallow or ruddy parts.
 
 Such traits are mostly alike on the left and the right: of the variance over the skin a share of SYMMETRIC is that of
 the part which mirroring leaves as it is.
@@ -25,7 +24,7 @@ FADE_MM = 7.0  # half the width of a tan line
 
 
 def broad_traits(person: Person, on: Canvas) -> tuple[np.ndarray, np.ndarray]:
-    """What they add to the logarithms of melanin and of blood, float32 [N] each."""
+    """Draw additions to the logarithms of melanin and of blood, float32 [N] each."""
     rng = np.random.default_rng([person.seed, 62])
     area = regions(on)
     melanin = (
@@ -41,28 +40,23 @@ def broad_traits(person: Person, on: Canvas) -> tuple[np.ndarray, np.ndarray]:
         + rng.normal(0, 0.2) * area["chin"]
         + rng.normal(0, 0.12) * area["forehead"]
     )
-    return tuple(
-        _with_sides(field + share * _even_noise(on, rng), on, rng) for field, share in ((melanin, 0.06), (blood, 0.10))
-    )
+    fields = []
+    for field, share in ((melanin, 0.06), (blood, 0.10)):
+        noise = on.spread(on.soft(lambda at: octaves(at, WAVELENGTHS_MM, rng, smooth=True)))
+        even = ((noise + noise[:, ::-1]) / np.sqrt(2))[on.covered]
+        fields.append(_with_sides(field + share * even, on, rng))
+    return tuple(fields)
 
 
 def shaded(person: Person, on: Canvas, diffuse: np.ndarray) -> np.ndarray:
-    """The albedo [N, 3] with the shade of a shaven beard, which lies below the surface."""
+    """Shade the albedo [N, 3] by a shaven beard, which lies below the surface."""
     rng = np.random.default_rng([person.seed, 63])
     uneven = 1 + 0.15 * on.soft(lambda at: octaves(at, [14.0], rng, smooth=True))
     return beard_shadow(diffuse, np.clip(beard_region(on) * 0.8 * person.shade * uneven, 0, 1))
 
 
-def symmetry(field: np.ndarray, on: Canvas) -> float:
-    """Share of the variance of a field [N] over the bare skin that is alike on both sides."""
-    picture, skin = on.spread(field), on.spread(regions(on)["bald"])
-    even, odd = (picture + picture[:, ::-1]) / 2, (picture - picture[:, ::-1]) / 2
-    variance = [float(np.average((half - np.average(half, weights=skin)) ** 2, weights=skin)) for half in (even, odd)]
-    return variance[0] / sum(variance)
-
-
 def _shaded(on: Canvas, rng: np.random.Generator) -> np.ndarray:
-    """Where a hat, glasses and a collar keep the sun off, worn or not, [N] of how much less melanin."""
+    """Draw the lack of melanin [N] where a hat, glasses and a collar keep the sun off."""
     position, at = on.position, on.landmarks
     hat = np.clip((position[:, 2] - at[9, 2] - rng.uniform(18, 32)) / FADE_MM, 0, 1)
     glasses = np.zeros(len(position), np.float32)
@@ -75,14 +69,8 @@ def _shaded(on: Canvas, rng: np.random.Generator) -> np.ndarray:
     return (worn[0] * 0.25 * hat + worn[1] * 0.3 * glasses + worn[2] * 0.45 * collar).astype(np.float32)
 
 
-def _even_noise(on: Canvas, rng: np.random.Generator) -> np.ndarray:
-    picture = on.spread(on.soft(lambda at: octaves(at, WAVELENGTHS_MM, rng, smooth=True)))
-    return ((picture + picture[:, ::-1]) / np.sqrt(2))[on.covered]
-
-
 def _with_sides(field: np.ndarray, on: Canvas, rng: np.random.Generator) -> np.ndarray:
-    """The field [N] made even, and as much that differs between the sides as leaves it symmetric to a share of
-    SYMMETRIC."""
+    """Make the field [N] even, and add as much difference between the sides as SYMMETRIC asks."""
     picture, skin = on.spread(field), on.spread(regions(on)["bald"])
     even = (picture + picture[:, ::-1]) / 2
     odd = on.spread(on.soft(lambda at: octaves(at, WAVELENGTHS_MM, rng, smooth=True)))

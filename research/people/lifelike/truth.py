@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a camera sees of a person before there is light, by rays on the CPU: albedo with and without what grows and is
-worn, parts, normals, shadow.
+"""The truth of a person through a camera, by rays on the CPU: albedo with and without hair, parts, normals, shadow.
 
 Strands are slim prisms here and curves in Cycles; neither Blender nor a GPU is needed.
 """
@@ -15,7 +14,7 @@ import numpy as np
 from core.face import template
 from core.face.strands import prisms
 from core.geometry import raster
-from core.geometry.meshes import Mesh, joined, vertex_normals
+from core.geometry.meshes import Mesh, joined, unit, vertex_normals
 from core.geometry.views import View
 
 from .figure import PARTS, Figure
@@ -26,10 +25,13 @@ FACIAL = [PARTS.index(name) for name in ("brows", "lashes", "beard")]
 
 @dataclass(frozen=True)
 class Truth:
-    """seen, bare float32 [h, w, 3]: linear albedo as it is seen, and of the skin and eyes below hair and clothes; alpha
-    [h, w]; parts [h, w, len(PARTS)]: how much of a pixel each part covers; face bool [h, w]: the face with its brows
-    and beard, without the eyes and what head hair or clothes hide; normal [h, w, 3] of the head, unit, in its own axes;
-    shadow bool [h, w]: where the sun does not reach."""
+    """The truth of a picture.
+
+    seen, bare float32 [h, w, 3]: linear albedo as seen, and of the skin and eyes below hair and clothes; alpha [h, w];
+    parts [h, w, len(PARTS)]: cover of a pixel by each part; face bool [h, w]: the face with its brows and beard,
+    without the eyes and what head hair or clothes hide; normal [h, w, 3] of the head, unit, in its own axes; shadow
+    bool [h, w]: out of the sun's reach.
+    """
 
     seen: np.ndarray
     bare: np.ndarray
@@ -41,8 +43,11 @@ class Truth:
 
 
 class Scene:
-    """A figure ready for rays: `whole` in the head's own axes, `body` the same without hair and clothes; `blockers`,
-    what stands in the light's way, in the world's axes, since it does not sway with the head."""
+    """A figure ready for rays.
+
+    `whole` in the head's own axes, `body` the same without hair and clothes; `blockers` of the light, in the world's
+    axes, since they do not sway with the head.
+    """
 
     def __init__(self, figure: Figure, blockers: Mesh | None = None):
         body = [figure.opened.skin, *(ball.mesh for ball in figure.opened.balls)]
@@ -66,7 +71,7 @@ class Scene:
         self.blockers = raster.RayCaster(blockers) if blockers else None
 
     def albedo(self, face: np.ndarray, bary: np.ndarray, skin: np.ndarray) -> np.ndarray:
-        """Linear albedo [N, 3] of what rays hit, `skin` [S, S, 3] being the skin's."""
+        """Return the linear albedo [N, 3] at the rays' hits; `skin` [S, S, 3] is the skin's."""
         out = self.colour[face]
         for label, picture in ((SKIN, skin), (EYES, self.figure.eye)):
             here = self.part[face] == label
@@ -78,49 +83,43 @@ class Scene:
 def trace_truth(
     scene: Scene, view: View, sun: np.ndarray | None = None, over: int = 3, pose: np.ndarray | None = None
 ) -> Truth:
-    """The truth through a view.
+    """Trace the truth through a view in the head's own axes.
 
-    Parameters
-    ----------
-    scene : the person
-    view : the camera, in the head's own axes
-    sun : [3], unit direction to it in these axes; None: there is no shadow
-    over : rays along a pixel's side
-    pose : [4, 4], head to world; None: they are one
+    sun [3]: unit direction in these axes, None for no shadow; over: rays along a pixel's side; pose [4, 4]: head to
+    world, None for identity.
     """
     face, bary, _ = raster.render_view(scene.whole, view, over)
     hit = face >= 0
     seen, parts = np.zeros((*hit.shape, 3), np.float32), np.zeros((*hit.shape, len(PARTS)), np.float32)
     seen[hit] = scene.albedo(face[hit], bary[hit], scene.figure.seen)
     parts[hit, scene.part[face[hit]]] = 1
-    skin = hit & (scene.part[np.maximum(face, 0)] == SKIN)
-    lips, facial = (_of_uv(scene, name, face[skin], bary[skin]) for name in ("lips", "face"))
+    part = np.where(hit, scene.part[face], -1)
+    skin = part == SKIN
+    uv = (scene.uv[face[skin]] * bary[skin][..., None]).sum(1)
+    lips, facial = (raster.sample_uv(template.mask(name, 1024), uv) for name in ("lips", "face"))
     parts[skin, LIPS], parts[skin, SKIN] = lips, 1 - lips
-    in_face = np.zeros(hit.shape, np.float32)
-    in_face[skin] = facial
-    in_face[hit & np.isin(scene.part[np.maximum(face, 0)], FACIAL)] = 1
-    dark = np.zeros(hit.shape, np.float32)
+    in_face, dark = np.zeros((2, *hit.shape), np.float32)
+    in_face[skin], in_face[np.isin(part, FACIAL)] = facial, 1
     if sun is not None:
         a, b, c = (scene.whole.mesh.vertices[scene.whole.mesh.faces[face[hit]][:, i]] for i in range(3))
-        normal = np.cross(b - a, c - a)
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        normal = unit(np.cross(b - a, c - a))
         points = a * bary[hit, :1] + b * bary[hit, 1:2] + c * bary[hit, 2:]
         dark[hit] = (normal @ sun <= 0) | _blocked(scene, points + 5e-4 * normal, sun, pose)
     bare, normal = _bare(scene, view, over)
-    cover = _shrunk(hit.astype(np.float32), over)
+    cover = block_mean(hit.astype(np.float32), over)
     return Truth(
-        _shrunk(seen, over) / np.maximum(cover, 1e-6)[..., None],
+        block_mean(seen, over) / np.maximum(cover, 1e-6)[..., None],
         bare,
         cover,
-        _shrunk(parts, over),
-        (_shrunk(in_face, over) > 0.5) & (cover > 0.99),
+        block_mean(parts, over),
+        (block_mean(in_face, over) > 0.5) & (cover > 0.99),
         normal,
-        _shrunk(dark, over) > 0.5,
+        block_mean(dark, over) > 0.5,
     )
 
 
 def _blocked(scene: Scene, points: np.ndarray, sun: np.ndarray, pose: np.ndarray | None) -> np.ndarray:
-    """Whether the figure itself, or a blocker while the head is as `pose` says, keeps the sun from points, bool [N]."""
+    """Return the points [N] that the figure, or a blocker while the head is as `pose` says, keeps from the sun."""
     blocked = scene.whole.blocked(points, np.repeat(sun[None], len(points), 0))
     if scene.blockers is None:
         return blocked
@@ -130,23 +129,17 @@ def _blocked(scene: Scene, points: np.ndarray, sun: np.ndarray, pose: np.ndarray
 
 
 def _bare(scene: Scene, view: View, over: int) -> tuple[np.ndarray, np.ndarray]:
-    """Albedo and normals [h, w, 3] each, without hair and clothes."""
+    """Return albedo and normals [h, w, 3] each, without hair and clothes."""
     face, bary, _ = raster.render_view(scene.body, view, over)
     hit = face >= 0
-    colour, normal = np.zeros((*hit.shape, 3), np.float32), np.zeros((*hit.shape, 3), np.float32)
+    colour, normal = np.zeros((2, *hit.shape, 3), np.float32)
     colour[hit] = scene.albedo(face[hit], bary[hit], scene.figure.skin.diffuse)
     normal[hit] = raster.interpolate(scene.normals, scene.body.mesh.faces, face[hit], bary[hit])
-    cover, normal = _shrunk(hit.astype(np.float32), over)[..., None], _shrunk(normal, over)
-    length = np.linalg.norm(normal, axis=-1, keepdims=True)
-    return _shrunk(colour, over) / np.maximum(cover, 1e-6), normal / np.maximum(length, 1e-6)
+    cover = block_mean(hit.astype(np.float32), over)[..., None]
+    return block_mean(colour, over) / np.maximum(cover, 1e-6), unit(block_mean(normal, over))
 
 
-def _of_uv(scene: Scene, name: str, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
-    uv = (scene.uv[face] * bary[..., None]).sum(1)
-    return raster.sample_uv(template.mask(name, 1024), uv)
-
-
-def _shrunk(image: np.ndarray, factor: int) -> np.ndarray:
-    """The mean of each factor x factor block."""
-    h, w = image.shape[0] // factor, image.shape[1] // factor
-    return image[: h * factor, : w * factor].reshape(h, factor, w, factor, *image.shape[2:]).mean((1, 3))
+def block_mean(image: np.ndarray, factor: int) -> np.ndarray:
+    """Average each factor x factor block."""
+    height, width = image.shape[0] // factor, image.shape[1] // factor
+    return image.reshape(height, factor, width, factor, *image.shape[2:]).mean((1, 3))

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a camera sees of a person before there is light, small enough to be kept, so that any number of lights can be
-put on it (snapshot.py).
+"""Views of a person without light, small enough to be kept, for any number of lights (snapshot.py).
 
 A square around the head from wherever a phone may be held; each ray also learns whether two lamps and one random
 direction of the sky are free.
@@ -13,43 +12,36 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
-import pycolmap
 
 from core.capture.files import replacing
 from core.face import template
 from core.face.parts import MARGIN_FACE_HEIGHTS, PARTS
 from core.geometry import raster
+from core.geometry.meshes import unit
 from core.geometry.views import View
 from core.imaging import images
 
+from ..cameras import hold_camera, pinhole_view
 from .figure import PARTS as GROWN
 from .figure import Figure
-from .truth import Scene
+from .truth import Scene, block_mean
 
 SIZE, OVER = 288, 2  # of the square in pixels; rays along a pixel's side
 WIDER = 1.33  # than the crop in which a parser looks: what shifts and turns of it may show
 LAMPS = 2
-OF_TRUTH = {
-    "skin": "skin",
-    "lips": "lips",
-    "brows": "brows",
-    "lashes": "eyes",
-    "beard": "beard",
-    "hair": "hair",
-    "eyes": "eyes",
-    "clothes": "clothes",
-}
-"""The part of face/parts.py that each part of the truth belongs to."""
 THICKER = {"hair": (1.0, 2.6), "beard": (0.9, 1.8), "brows": (0.9, 1.5), "lashes": (0.8, 1.4)}
 """Factors on the hairs' radii: people have four times as many hairs as figures."""
 
 
 @dataclass(frozen=True)
 class Unlit:
-    """albedo uint8 [S, S, 3] sRGB; shares uint8 [S, S, len(PARTS)] of 255; normal int8 [S, S, 3] in the head's axes, of
-    127; reach uint8 [S, S, LAMPS]: how much of each lamp arrives and faces the surface; free uint8 [S, S]: of the sky;
-    lamps [LAMPS, 3] unit; rotation [3, 3] head to camera; centre [3] of the camera; focal in pixels; landmarks [468, 2]
-    in pixels."""
+    """View of a person without light.
+
+    albedo uint8 [S, S, 3] sRGB; shares uint8 [S, S, len(PARTS)] of 255; normal int8 [S, S, 3] in the head's axes, of
+    127; reach uint8 [S, S, LAMPS]: share of each lamp that arrives and faces the surface; free uint8 [S, S]: of the
+    sky; lamps [LAMPS, 3] unit; rotation [3, 3] head to camera; centre [3] of the camera; focal in pixels; landmarks
+    [468, 2] in pixels.
+    """
 
     albedo: np.ndarray
     shares: np.ndarray
@@ -64,7 +56,7 @@ class Unlit:
 
 
 def scene_of(figure: Figure, rng: np.random.Generator) -> Scene:
-    """A figure ready for rays, its hair as dense as some people's is."""
+    """Return a figure ready for rays, its hair as dense as some people's is."""
     dense = [
         replace(strands, radius=(strands.radius * rng.uniform(*THICKER[strands.part])).astype(np.float32))
         for strands in figure.strands
@@ -73,87 +65,54 @@ def scene_of(figure: Figure, rng: np.random.Generator) -> Scene:
 
 
 def landmarks_of(figure: Figure) -> np.ndarray:
-    """MediaPipe's landmarks on the figure [468, 3] in metres."""
+    """Return MediaPipe's landmarks on the figure [468, 3] in metres."""
     return template.landmark_points(figure.head)
 
 
 def random_view(
     figure: Figure, rng: np.random.Generator, size: int = SIZE, margin: float = WIDER * MARGIN_FACE_HEIGHTS
 ) -> View:
-    """A square picture around the head, from the front to beyond the profile, from above and below, near and far, held
-    askew.
+    """Return a square picture around the head, from in front to beyond the profile, near and far, held askew.
 
-    Parameters
-    ----------
-    figure : whose head
-    rng : of where the camera stands
-    size : pixels along a side
-    margin : side of the picture in sides of the face's landmarks
+    size in pixels; margin: side of the picture in sides of the face's landmarks.
     """
     yaw, pitch, roll = np.radians(
         [rng.uniform(-100, 100) if rng.random() < 0.45 else rng.normal(0, 25), rng.normal(0, 13), rng.normal(0, 6)]
     )
-    back = np.array([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)])
-    right = np.cross([0, 0, 1.0], back)
-    right /= np.linalg.norm(right)
-    up = np.cross(back, right)
-    right, up = np.cos(roll) * right + np.sin(roll) * up, np.cos(roll) * up - np.sin(roll) * right
     distance = np.exp(rng.uniform(np.log(0.35), np.log(1.6)))
-    landmarks = landmarks_of(figure)
-    rotation = np.stack([right, -up, -back])
-    middle = landmarks.mean(0)
-    local = (landmarks - middle) @ rotation.T + [0, 0, distance]
-    plane = local[:, :2] / local[:, 2:]
-    low, high = plane.min(0), plane.max(0)
+    rotation, translation, (low, high) = hold_camera(landmarks_of(figure), yaw, pitch, roll, distance)
     focal = size / (margin * (high - low).max())
-    at = size / 2 - focal * (low + high) / 2
-    camera = pycolmap.Camera(model="PINHOLE", width=size, height=size, params=[focal, focal, *at])
-    return View("", Path(), camera, rotation, np.array([0, 0, distance]) - rotation @ middle, True)
+    return pinhole_view((size, size), focal, size / 2 - focal * (low + high) / 2, rotation, translation)
 
 
 def trace_unlit(scene: Scene, view: View, rng: np.random.Generator, over: int = OVER) -> Unlit:
-    """A view of a scene with lamps from anywhere before the person.
+    """Trace a square view, in the head's axes, with lamps from anywhere before the person.
 
-    Parameters
-    ----------
-    scene : the person
-    view : a square one, in the head's axes
-    rng : of the lamps and of the directions of the sky
-    over : rays along a pixel's side
+    over: rays along a pixel's side.
     """
     face, bary, _ = raster.render_view(scene.whole, view, over)
     hit = face >= 0
     triangle, weight = face[hit], bary[hit].astype(np.float32)
     corners = scene.whole.mesh.vertices[scene.whole.mesh.faces[triangle]]
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-12)
+    flat = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     flat[flat @ -view.axis < 0] *= -1
     normal = flat.copy()
     body = triangle < len(scene.body.mesh.faces)
     normal[body] = raster.interpolate(scene.normals, scene.body.mesh.faces, triangle[body], weight[body])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+    normal = unit(normal)
     points = (corners * weight[..., None]).sum(1) + 5e-4 * flat
     lamps = _lamps(view, rng)
     reach = [
         ((normal @ lamp > 0) & ~scene.whole.blocked(points, np.repeat(lamp[None], len(points), 0))).astype(np.float32)
         for lamp in lamps
     ]
-    sky = normal + _unit(rng.normal(size=normal.shape))  # cosine-weighted about the normal
-    free = ~scene.whole.blocked(points, _unit(sky))
-    layers = np.concatenate(
-        [
-            scene.albedo(triangle, weight, scene.figure.seen),
-            _shares(scene, triangle, weight),
-            normal,
-            np.stack(reach, 1),
-            free[:, None],
-        ],
-        1,
-    )
+    sky = normal + unit(rng.normal(size=normal.shape))  # cosine-weighted about the normal
+    free = ~scene.whole.blocked(points, unit(sky))
+    albedo, shares = scene.albedo(triangle, weight, scene.figure.seen), _shares(scene, triangle, weight)
+    layers = np.concatenate([albedo, shares, normal, np.stack(reach, 1), free[:, None]], 1)
     picture = np.zeros((*hit.shape, layers.shape[1] + 1), np.float32)
     picture[hit, :-1], picture[hit, -1] = layers, 1
-    size = view.height
-    picture = picture.reshape(size, over, size, over, -1).mean((1, 3))
+    picture = block_mean(picture, over)
     mean = picture[..., :-1] / np.maximum(picture[..., -1:], 1e-6)
     albedo, shares, normal, reach, free = np.split(mean, np.cumsum([3, len(PARTS), 3, LAMPS]), 2)
     shares = shares * picture[..., -1:]
@@ -174,11 +133,13 @@ def trace_unlit(scene: Scene, view: View, rng: np.random.Generator, over: int = 
 
 
 def true_shares(coverage: np.ndarray) -> np.ndarray:
-    """The coverage [..., len(figure.PARTS)] of truth.Truth as shares of face/parts.py [..., len(PARTS)]; the rest is
-    background."""
+    """Convert coverage [..., len(figure.PARTS)] of truth.Truth to shares of face/parts.py [..., len(PARTS)].
+
+    Lashes belong to the eyes; the rest is background.
+    """
     out = np.zeros((*coverage.shape[:-1], len(PARTS)), np.float32)
     for k, name in enumerate(GROWN):
-        out[..., PARTS.index(OF_TRUTH[name])] += coverage[..., k]
+        out[..., PARTS.index("eyes" if name == "lashes" else name)] += coverage[..., k]
     out[..., -1] = np.clip(1 - out[..., :-1].sum(-1), 0, 1)
     return out
 
@@ -190,38 +151,36 @@ def save(path: Path, unlit: Unlit) -> None:
 
 def load(path: Path) -> Unlit:
     with np.load(path, allow_pickle=False) as stored:
-        return Unlit(**{field.name: stored[field.name] for field in fields(Unlit)})
+        return Unlit(**stored)
 
 
 def _shares(scene: Scene, triangle: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """What each hit belongs to [N, len(PARTS)]: the skin where hair grows belongs to the hair as far as it is dense
-    there."""
+    """Return the shares of each hit [N, len(PARTS)].
+
+    The skin where hair grows belongs to the hair as far as it is dense there.
+    """
     labels = scene.part[triangle]
     shares = true_shares(np.eye(len(GROWN), dtype=np.float32)[labels])
     skin = np.flatnonzero(labels == GROWN.index("skin"))
     uv = (scene.uv[triangle[skin]] * weight[skin, :, None]).sum(1)
     at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1)
-    left = np.ones(len(skin), np.float32)
+    remainder = np.ones(len(skin), np.float32)
     for name, where in (("lips", template.mask("lips", 1024)), *scene.figure.growth.items()):
-        share = left * np.clip(raster.sample(where, at * len(where)), 0, 1)
+        share = remainder * np.clip(raster.sample(where, at * len(where)), 0, 1)
         shares[skin, PARTS.index(name)] = share
-        left = left - share
-    shares[skin, PARTS.index("skin")] = left
+        remainder = remainder - share
+    shares[skin, PARTS.index("skin")] = remainder
     return shares
 
 
 def _lamps(view: View, rng: np.random.Generator) -> np.ndarray:
-    """Unit directions [LAMPS, 3] to lamps: seldom from behind the person, seldom from below."""
+    """Draw unit directions [LAMPS, 3] to lamps: seldom from behind the person, seldom from below."""
     lamps: list[np.ndarray] = []
     while len(lamps) < LAMPS:
-        way = _unit(rng.normal(size=3) + [0, -0.5, 0.35])
+        way = unit(rng.normal(size=3) + [0, -0.5, 0.35])
         if way @ -view.axis > -0.6 and way[2] > -0.5:
             lamps.append(way)
     return np.stack(lamps)
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
 def _bytes(unit_values: np.ndarray) -> np.ndarray:
