@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from core.capture.capture import Capture
-from core.capture.messages import Problem, Reporter
+from core.capture.messages import Reporter
 from core.face import template
 from core.face.head import Head, read_filmed_head, read_head
 from core.geometry import meshes, raster
 from core.settings.settings import from_json
 from tests.fixtures.painted_skin import SHORT
 from tests.fixtures.photographed_head import capture_of, skin
+from tests.fixtures.refused import refused
 
 SIZE = 64
 STAGES = ("delight", "texture", "shadow_mask", "solve", "upscale", "transfer")
@@ -76,8 +77,7 @@ def test_what_is_shared_cannot_be_written_to(tmp_path):
 
 
 def test_a_capture_without_a_head_is_a_problem(tmp_path):
-    with pytest.raises(Problem, match="head.obj"):
-        read_head(Capture(tmp_path))
+    refused(lambda: read_head(Capture(tmp_path)), "head.obj")
 
 
 @pytest.mark.parametrize("change", ["other UVs", "no UVs", "other triangles"])
@@ -91,5 +91,4 @@ def test_another_mesh_in_the_place_of_the_head_is_refused(tmp_path, change):
     }[change]
     meshes.write_obj(capture.head, other)
     for read in (read_head, read_filmed_head):
-        with pytest.raises(Problem, match="head.obj"):
-            read(capture)
+        refused(lambda read=read: read(capture), "head.obj")

@@ -22,20 +22,29 @@ from core.stages.cameras.motion import expression_changes
 from research.people import painted_head
 from research.people.painted_head import place_camera
 
-
-def place(azimuth_deg, elevation_deg=0.0) -> np.ndarray:
-    a, e = np.radians(azimuth_deg), np.radians(elevation_deg)
-    return 0.5 * np.stack([np.sin(a) * np.cos(e), -np.cos(a) * np.cos(e), np.sin(e) * np.ones_like(a)], -1)
+REPORT = Reporter("cameras")
 
 
-def solve(folder, capture: Capture, **settings) -> Reporter:
-    capture.root.mkdir(parents=True, exist_ok=True)
-    capture.set_source(folder)
-    chosen = from_json({"cameras": settings})
+def solve(folder, views: list, pictures=None, **settings) -> tuple[Capture, Reporter]:
+    """The capture of photographs of the person by these cameras, or of other pictures, and what is said of it."""
+    for i, view in enumerate(views):
+        picture = pictures[i] if pictures else painted_head.photograph(view, wall=False)
+        images.write_srgb(folder / "photos" / f"{i}.png", picture)
+    capture, report, chosen = Capture(folder / "face.wildcap"), Reporter("cameras"), from_json({"cameras": settings})
+    capture.root.mkdir()
+    capture.set_source(folder / "photos")
     frames.run(capture, chosen, Reporter("frames"))
-    report = Reporter("cameras")
     cameras.run(capture, chosen, report)
-    return report
+    return capture, report
+
+
+def photographs(folder, azimuths, flips, scale=1.0, wall=True) -> list[str]:
+    """The names of photographs, mirrored where the flip is -1."""
+    names = [f"{i}.png" for i in range(len(azimuths))]
+    for name, azimuth, flip in zip(names, azimuths, flips, strict=True):
+        picture = painted_head.photograph(place_camera(azimuth, 0.02, scale=scale), wall=wall)
+        images.write_srgb(folder / name, picture[:, ::flip])
+    return names
 
 
 def problems(report: Reporter) -> str:
@@ -43,7 +52,10 @@ def problems(report: Reporter) -> str:
 
 
 def missing(azimuths, elevations) -> str:
-    return " ".join(problem for problem, _ in coverage.missing(place(np.array(azimuths, float), np.array(elevations))))
+    """What is said of cameras 0.5 m from the head."""
+    a, e = np.radians(np.array(azimuths, float)), np.radians(elevations)
+    places = 0.5 * np.stack([np.sin(a) * np.cos(e), -np.cos(a) * np.cos(e), np.sin(e)], -1)
+    return " ".join(problem for problem, _ in coverage.missing(places))
 
 
 def test_missing_sides_are_named():
@@ -59,42 +71,35 @@ def test_missing_sides_are_named():
 
 
 def test_three_photographs_give_cameras_and_say_that_they_are_rough(tmp_path):
-    """Nothing but the face to go by: sixty degrees apart, before a wall without structure."""
-    for i, azimuth in enumerate((-38, 0, 38)):
-        picture = painted_head.photograph(place_camera(azimuth, 0.02), wall=False)
-        images.write_srgb(tmp_path / "photos" / f"{i}.png", picture)
-    report = solve(tmp_path / "photos", Capture(tmp_path / "face.wildcap"), features="face")
+    """Nothing but the face to go by: before a wall without structure."""
+    _, report = solve(tmp_path, [place_camera(azimuth, 0.02) for azimuth in (-38, 0, 38)], features="face")
     assert report.figures["frames_registered"] == 3 and report.figures["features"] == "face"
     assert report.figures["angular_coverage_deg"] == pytest.approx(76, abs=12)
     assert "to ten degrees or so" in problems(report) and "gap" in problems(report)
 
 
 def test_a_mirrored_photograph_is_named(tmp_path):
-    names = [f"{i}.png" for i in range(4)]
-    for name, azimuth, flip in zip(names, (-18, -6, 6, 18), (1, 1, -1, 1), strict=True):
-        images.write_srgb(tmp_path / name, painted_head.photograph(place_camera(azimuth, 0.02))[:, ::flip])
-    assert find_mirrored(names, [], tmp_path, Reporter("cameras")) == ["2.png"]
-    assert find_mirrored(["2.png", "3.png"], ["0.png", "1.png"], tmp_path, Reporter("cameras")) == ["2.png"]
-    assert find_mirrored(["0.png", "1.png", "3.png"], [], tmp_path, Reporter("cameras")) == []
+    names = photographs(tmp_path, (-18, -6, 6, 18), (1, 1, -1, 1))
+    for first, others, mirrored in (
+        (names, [], ["2.png"]),
+        (names[2:], names[:2], ["2.png"]),
+        (["0.png", "1.png", "3.png"], [], []),
+    ):
+        assert find_mirrored(first, others, tmp_path, REPORT) == mirrored
 
 
 def test_the_two_sides_of_a_symmetric_face_are_not_taken_for_each_others_mirror_image(tmp_path):
-    names, found = [f"{i}.png" for i in range(3)], {}
     # from the right, and as if from the left
-    for name, azimuth, flip in zip(names, (-30, -28, -33), (1, -1, -1), strict=True):
-        images.write_srgb(
-            tmp_path / name, painted_head.photograph(place_camera(azimuth, 0.02, scale=2), wall=False)[:, ::flip]
-        )
-        found[name] = faces.detect(images.read_srgb(tmp_path / name))
-    assert find_mirrored(names, [], tmp_path, Reporter("cameras")) == ["0.png"], "by the pictures alone it is one"
-    assert find_mirrored(names, [], tmp_path, Reporter("cameras"), found) == []
+    names = photographs(tmp_path, (-30, -28, -33), (1, -1, -1), scale=2, wall=False)
+    found = {name: faces.detect(images.read_srgb(tmp_path / name)) for name in names}
+    assert find_mirrored(names, [], tmp_path, REPORT) == ["0.png"], "by the pictures alone it is one"
+    assert find_mirrored(names, [], tmp_path, REPORT, found) == []
 
 
 def test_a_head_that_turns_before_a_still_camera_is_told(tmp_path):
-    for i, turn in enumerate(np.linspace(-24, 24, 7)):
-        picture = painted_head.photograph(place_camera(0, 0.03), turned_deg=turn)
-        images.write_srgb(tmp_path / "photos" / f"{i}.png", picture)
-    report = solve(tmp_path / "photos", Capture(tmp_path / "face.wildcap"), features="plain")
+    views, turns = [place_camera(0, 0.03)] * 7, np.linspace(-24, 24, 7)
+    pictures = [painted_head.photograph(views[0], turned_deg=turn) for turn in turns]
+    _, report = solve(tmp_path, views, pictures, features="plain")
     assert "The head turned while the camera stood still" in problems(report)
     assert report.figures["angular_coverage_deg"] == pytest.approx(48, abs=12)
 
@@ -102,7 +107,7 @@ def test_a_head_that_turns_before_a_still_camera_is_told(tmp_path):
 @pytest.mark.parametrize(("stood", "word"), [(True, "stood still"), (False, "background")])
 def test_a_head_that_moved_and_does_not_tell_its_own_motion_is_refused(stood, word):
     film = Frames(tuple(FrameRecord(name=f"{i}.jpg", sharpness=1.0, selected=True) for i in range(9)), VIDEO)
-    problem = solving._explained(film, ["Nothing fits."], {}, True, stood, None, Reporter("cameras"))
+    problem = solving._explained(film, ["Nothing fits."], {}, True, stood, None, REPORT)
     assert word in problem.problem and "move the camera instead" in problem.remedy
 
 
@@ -124,14 +129,11 @@ def test_an_open_mouth_in_some_frames_is_told():
 def test_one_photograph_or_two_make_a_draft(tmp_path, azimuths):
     """Nothing matches, and where a single side is seen the depths are those of other heads: the face lies on the
     picture, in metres by the distance of the pupils."""
-    for i, azimuth in enumerate(azimuths):
-        picture = painted_head.photograph(place_camera(azimuth, 0.02), wall=False)
-        images.write_srgb(tmp_path / "photos" / f"{i}.png", picture)
-    capture = Capture(tmp_path / "face.wildcap")
-    report = solve(tmp_path / "photos", capture)
+    views = [place_camera(azimuth, 0.02) for azimuth in azimuths]
+    capture, report = solve(tmp_path, views)
     assert report.figures["frames_registered"] == len(azimuths) and "overlap" not in problems(report)
     head = template.landmark_points(painted_head.person()[0].mesh)
-    for view, azimuth in zip(read_views(capture), azimuths, strict=True):
-        there, here = (each.project(head)[0] for each in (place_camera(azimuth, 0.02), view))
+    for placed, true in zip(read_views(capture), views, strict=True):
+        there, here = (each.project(head)[0] for each in (true, placed))
         miss = np.linalg.norm(there - here, axis=1)[template.landmark_weights() > 0.2]
         assert np.median(miss) < 0.04 * np.ptp(there[:, 0]), "of the face's width"

@@ -20,48 +20,28 @@ from research.people.painted_head import photograph, place_camera
 TURNS = -28, -14, 0, 14, 28
 
 
-def film(folder, pictures) -> dict[str, faces.Face]:
-    """Writes the pictures as frames; the faces in them."""
-    found = {}
-    for i, picture in enumerate(pictures):
-        name = f"{i:05d}.jpg"
-        images.write_srgb(folder / name, picture, quality=95)
-        found[name] = faces.detect(images.read_srgb(folder / name))
-    return found
-
-
 @pytest.mark.parametrize(
-    ("pictures", "stays"),
+    ("turns", "wall", "stays"),
     [
-        pytest.param(
-            lambda: [photograph(place_camera(0, 0.03), turned_deg=turn) for turn in TURNS], True, id="the head turns"
-        ),
-        pytest.param(
-            lambda: [photograph(place_camera(turn, 0.03)) for turn in TURNS], False, id="the camera goes round"
-        ),
-        pytest.param(
-            lambda: [photograph(place_camera(turn, 0.03), wall=False) for turn in TURNS],
-            False,
-            id="a bare wall, which does not tell",
-        ),
-        pytest.param(
-            lambda: [photograph(place_camera(0, 0.03), turned_deg=turn) for turn in (-3, 0, 3)],
-            False,
-            id="nobody turns",
-        ),
+        pytest.param([(0, turn) for turn in TURNS], True, True, id="the head turns"),
+        pytest.param([(turn, 0) for turn in TURNS], True, False, id="the camera goes round"),
+        pytest.param([(turn, 0) for turn in TURNS], False, False, id="a bare wall, which does not tell"),
+        pytest.param([(0, turn) for turn in (-3, 0, 3)], True, False, id="nobody turns"),
     ],
 )
-def test_a_camera_that_stood_still_is_seen_in_a_few_pictures(tmp_path, pictures, stays):
-    found = film(tmp_path, pictures())
+def test_a_camera_that_stood_still_is_seen_in_a_few_pictures(tmp_path, turns, wall, stays):
+    found = {}
+    for i, (camera, head) in enumerate(turns):
+        picture, path = photograph(place_camera(camera, 0.03), wall=wall, turned_deg=head), tmp_path / f"{i:05d}.jpg"
+        images.write_srgb(path, picture, quality=95)
+        found[path.name] = faces.detect(images.read_srgb(path))
     assert all(face is not None for face in found.values())
     assert surroundings_stay(found, tmp_path) is stays
 
 
 def records(count: int) -> list[FrameRecord]:
-    return [
-        FrameRecord(name=f"{i:05d}.jpg", sharpness=1.0, selected=i % 31 == 7, yaw_deg=float(i % 40))
-        for i in range(count)
-    ]
+    frame = FrameRecord(name="", sharpness=1.0, selected=False)
+    return [replace(frame, name=f"{i:05d}.jpg", selected=i % 31 == 7, yaw_deg=float(i % 40)) for i in range(count)]
 
 
 def test_the_frames_asked_are_spread_over_the_film_and_hold_those_of_the_texture():

@@ -22,7 +22,6 @@ from tests.fixtures.moving_face import moving_face, number_in, refused, take
 
 
 def write_video(path, pictures):
-    path.parent.mkdir(parents=True, exist_ok=True)
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=Fraction(24))
         stream.height, stream.width = pictures[0].shape[:2]
@@ -34,7 +33,7 @@ def write_video(path, pictures):
 
 
 def test_frames_are_those_the_record_says(capture, tmp_path):
-    source = write_video(tmp_path / "une entrée" / "IMG 0001.MOV", [moving_face(i) for i in range(50)])
+    source = write_video(tmp_path / "entrée 0001.MOV", [moving_face(i) for i in range(50)])
     record, report = take(capture, source, max_frames=8, views=4)
     assert record["kind"] == "video"
     assert [f["video_frame"] for f in record["frames"]] == np.round(np.linspace(0, 49, 8)).astype(int).tolist()
@@ -86,20 +85,15 @@ def test_a_damaged_recording_gives_what_is_there(capture, tmp_path):
 def test_bad_sources_are_refused(capture, tmp_path, folder):
     refused(capture, "", "No video")
     refused(capture, tmp_path / "gone.mp4", "no video")
-    for name, content, words in (
-        ("empty.mp4", b"", "empty"),
-        ("text.mp4", b"This is a shopping list, not a video.\n" * 50, "no video"),
-        ("zeros.mp4", bytes(2000), "no video"),
-    ):
-        (tmp_path / name).write_bytes(content)
-        refused(capture, tmp_path / name, words)
+    for content, words in ((b"", "empty"), (b"A shopping list.\n" * 99, "no video"), (bytes(2000), "no video")):
+        (tmp_path / "bad.mp4").write_bytes(content)
+        refused(capture, tmp_path / "bad.mp4", words)
     refused(capture, folder, "no photographs")
     (folder / "a.dng").write_bytes(b"raw")
     refused(capture, folder, "raw files")
     (folder / "b.avif").write_bytes(b"avif")
     refused(capture, folder, "are raw and AVIF files")
-    for name in ("0.png", "1.png"):
-        (folder / name).write_bytes(b"cut off while it was copied")
+    (folder / "0.png").write_bytes(b"cut off while it was copied")
     refused(capture, folder, "None of the photographs")
 
 
@@ -112,12 +106,11 @@ def test_no_face_and_no_motion_are_told(capture, tmp_path):
 
 
 def test_cancel_keeps_the_old_frames(capture, tmp_path):
-    capture.root.mkdir(parents=True)
-    capture.set_source(write_video(tmp_path / "clip.mp4", [moving_face(i) for i in range(4)]))
-    capture.frames.mkdir()
+    capture.frames.mkdir(parents=True)
     (capture.frames / "of before.jpg").touch()
-    calls = iter([False] * 2 + [True] * 100)
+    capture.set_source(write_video(tmp_path / "clip.mp4", [moving_face(i) for i in range(4)]))
+    calls = iter([False] * 2)
     with pytest.raises(CancelledError):
-        frames.run(capture, from_json({}), Reporter("frames", cancelled=lambda: next(calls)))
+        frames.run(capture, from_json({}), Reporter("frames", cancelled=lambda: next(calls, True)))
     assert [path.name for path in capture.frames.iterdir()] == ["of before.jpg"]
     assert not [p for p in capture.root.iterdir() if p.name.startswith(".")]

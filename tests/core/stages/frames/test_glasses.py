@@ -37,15 +37,9 @@ def with_rims(srgb: np.ndarray, thick: int = 4) -> np.ndarray:
     return over
 
 
-def test_rims_are_told_from_a_bare_face():
-    face = faces.detect(FACE)
-    assert sureness(FACE, face) < -1
+def test_rims_are_told_from_a_bare_face_and_a_capture_with_glasses_is_refused(capture, folder):
     worn = with_rims(FACE)
-    assert sureness(worn, faces.detect(worn)) > SURE_LOG_ODDS
-
-
-def test_a_capture_with_glasses_is_refused(capture, folder):
-    worn = with_rims(FACE)
+    assert sureness(FACE, faces.detect(FACE)) < -1 and sureness(worn, faces.detect(worn)) > SURE_LOG_ODDS
     for k in range(3):
         images.write_srgb(folder / f"{k}.png", worn[10 * k : 10 * k + 260, 20 * k : 20 * k + 280])
     refused(capture, folder, "wears glasses in 3 of 3 frames")

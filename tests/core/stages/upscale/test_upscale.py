@@ -13,7 +13,7 @@ import torch
 
 from core.capture import stages
 from core.capture.capture import Capture
-from core.capture.messages import CancelledError, Problem, Reporter
+from core.capture.messages import CancelledError, Reporter
 from core.face import template
 from core.imaging import images
 from core.settings.settings import from_json
@@ -23,6 +23,7 @@ from core.stages.upscale import gloss
 from core.stages.upscale.enlarge import enlarge, load_network
 from core.stages.upscale.maps import HeadMaps, read_maps
 from tests.fixtures.hairy_head import maps_of
+from tests.fixtures.refused import refused
 
 SMALL, LARGE = 256, 1024
 
@@ -99,8 +100,7 @@ def test_maps_of_the_wanted_size_are_left_as_they_are():
 def test_a_map_of_another_size_is_named(capture, name):
     write = images.write_linear if name.endswith(".exr") else images.write_data
     write(capture.maps / name, np.full((33, 33, 3) if name[0] in "ns" else (33, 33), 0.5))
-    with pytest.raises(Problem, match=f"{name} is 33 x 33"):
-        read_maps(capture.maps, capture.texture_confidence)
+    refused(lambda: read_maps(capture.maps, capture.texture_confidence), f"{name} is 33 x 33")
 
 
 def test_a_cancel_between_maps_leaves_no_folder(capture):
@@ -216,8 +216,7 @@ def test_a_map_of_many_strips_is_whole(tmp_path):
 
 
 def test_missing_weights_are_told(tmp_path):
-    with pytest.raises(Problem, match="weights are missing"):
-        load_network(tmp_path / "upscaler.safetensors")
+    refused(lambda: load_network(tmp_path / "upscaler.safetensors"), "weights are missing")
 
 
 def test_the_mean_specular_is_that_of_cheeks_and_forehead():
