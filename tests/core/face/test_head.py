@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The registered head: read once by each stage that works on it, and shared without being written to."""
+"""The built-in head: frozen, symmetric, closed, laid out without overlap; and the registered one, read once by each stage."""
 
 import importlib
 from dataclasses import replace
@@ -92,3 +92,66 @@ def test_another_mesh_in_the_place_of_the_head_is_refused(tmp_path, change):
     meshes.write_obj(capture.head, other)
     for read in (read_head, read_filmed_head):
         refused(lambda read=read: read(capture), "head.obj")
+
+
+# every shipped weight depends on this topology and these UVs: never change it
+FROZEN = "d77cc1f89fd306ed5b300c0877415150"
+
+
+def test_topology_and_uvs_are_frozen():
+    assert template.template_hash(template.load()) == FROZEN
+
+
+def test_uvs_cover_the_square_once():
+    mesh = template.load()
+    assert mesh.uvs.min() >= 0 and mesh.uvs.max() <= 1
+    a, b, c = (mesh.uvs[mesh.face_uvs[:, k]] for k in range(3))
+    area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
+    assert (area > -1e-9).all()  # none is flipped, and together they are the square: so none overlap
+    assert area.sum() == pytest.approx(1, abs=1e-3)
+
+
+def test_the_face_fills_sixty_percent_of_the_square():
+    assert (template.mask("face", 512) > 0.5).mean() >= 0.6
+
+
+def test_every_edge_but_the_necks_rim_has_two_triangles():
+    mesh = template.load()
+    edges = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
+    edges, count = np.unique(edges, axis=0, return_counts=True)
+    assert count.max() == 2
+    rim = mesh.vertices[edges[count == 1]].mean(1)
+    assert rim[:, 2].max() < -0.1  # lids, lips and nostrils are closed: the only opening is the neck
+
+
+def test_landmarks_are_where_their_names_say():
+    points = template.landmark_points(template.load())
+    assert points[263, 0] > 0.03 and points[33, 0] < -0.03  # the left eye's outer corner at +X
+    assert points[1, 1] < points[[263, 33], 1].min() - 0.02  # the nose's tip is the foremost, at -Y
+    # chin, mouth, tip, bridge, forehead
+    assert points[152, 2] < points[13, 2] < points[1, 2] < points[168, 2] < points[10, 2]
+    # pupils
+    assert np.linalg.norm(points[[263, 362]].mean(0) - points[[33, 133]].mean(0)) == pytest.approx(0.063, abs=0.003)
+    assert (template.landmark_weights() > 0).sum() > 400
+
+
+def test_the_persons_left_is_right_of_the_middle_of_the_map():
+    mesh = template.load()
+    face, bary = raster.rasterize_uv(mesh, 64)
+    x = raster.interpolate(mesh.vertices, mesh.faces, face, bary)[..., 0]
+    assert (x[8:56, 40:60] > 0).all() and (x[8:56, 4:24] < 0).all()
+
+
+def test_masks_do_not_contradict_each_other():
+    skin, lips, brows, face = (template.mask(name, 512) > 0.5 for name in ("skin", "lips", "brows", "face"))
+    assert not (skin & (lips | brows)).any() and (lips <= face).all()
+    assert sum((template.mask(name, 512) > 0.5).mean() for name in ("face", "ears", "neck", "scalp")) == pytest.approx(
+        1, abs=0.01
+    )
+
+
+def test_identities_differ_by_millimetres_and_stay_symmetric_on_average():
+    components = template.identity()
+    assert np.isfinite(components).all() and len(components) == 40
+    rms = np.sqrt((components**2).sum(-1).mean(-1)) * 1000
+    assert (np.diff(rms) < 0.05).all() and 1 < rms[0] < 10

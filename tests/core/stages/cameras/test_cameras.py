@@ -53,7 +53,7 @@ def solve(capture: Capture, source: Path, report: Reporter | None = None, **sett
 @pytest.fixture(scope="module")
 def solved(tmp_path_factory) -> tuple[Capture, np.ndarray, dict]:
     root = tmp_path_factory.mktemp("caméras d'été")
-    centres = photographed(root / "les photos", np.linspace(-32, 32, 8))
+    centres = photographed(root / "les photos", np.linspace(-32, 32, 7))
     capture = Capture(root / "a face.wildcap")
     return capture, centres, solve(capture, root / "les photos")
 
@@ -61,7 +61,7 @@ def solved(tmp_path_factory) -> tuple[Capture, np.ndarray, dict]:
 def test_known_cameras_are_found_in_the_heads_world(solved):
     """The face stands upright, looks along -Y, and its eyes are 63 mm apart around the origin."""
     capture, true, figures = solved
-    assert figures["frames_registered"] == 8 and figures["features"] == "plain"
+    assert figures["frames_registered"] == 7 and figures["features"] == "plain"
     assert figures["reprojection_error_px"] < 1
     assert figures["angular_coverage_deg"] == pytest.approx(64, abs=8)
     assert capture.picture("cameras", "world").is_file()
@@ -71,7 +71,7 @@ def test_known_cameras_are_found_in_the_heads_world(solved):
     off = np.linalg.norm(scale * centres @ rotation.T + shift - true, axis=1)
     assert np.median(off) < 0.005 and scale == pytest.approx(1, abs=0.06)  # in metres
     assert np.degrees(Rotation.from_matrix(rotation).magnitude()) < 8
-    for view in (views[2], views[6]):
+    for view in (views[1], views[5]):
         face = faces.detect(view.read())
         eyes = np.array([face.landmarks[list(eye), :2].mean(0) for eye in (faces.RIGHT_EYE, faces.LEFT_EYE)])
         expected, _ = view.project(np.array([[-0.0315, 0, 0], [0.0315, 0, 0]]))
@@ -140,7 +140,7 @@ def test_cancel_takes_effect_at_once_and_keeps_the_old_cameras(solved):
     assert time.monotonic() - started < 2.5 and times() == before
 
 
-def test_sixteen_frames_of_a_real_video_against_its_truth(tmp_path):
+def test_some_frames_of_a_real_video_against_its_truth(tmp_path):
     """Sparse and small, so the tolerance is five times what all 96 frames give."""
     truth = DATA / "lps_sun"
     if not truth.is_dir():
@@ -148,11 +148,11 @@ def test_sixteen_frames_of_a_real_video_against_its_truth(tmp_path):
     capture = Capture(tmp_path / "lps.wildcap")
     capture.root.mkdir()
     capture.set_source(truth / "capture.mp4")
-    settings = from_json({"frames": {"max_frames": 16}})
+    settings = from_json({"frames": {"max_frames": 12}})
     frames.run(capture, settings, Reporter("frames"))
     cameras.run(capture, settings, Reporter("cameras"))
     figures = compare(capture, truth)
-    assert figures["registered"] >= 14
+    assert figures["registered"] >= 11
     assert figures["centre_error_median_percent"] < 0.6
     # the scan holds its chin up: registration finds 7.5 degrees
     assert figures["up_tilt_deg"] < 13 and abs(figures["facing_off_deg"]) < 5

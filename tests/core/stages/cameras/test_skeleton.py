@@ -124,9 +124,9 @@ def test_a_frame_that_shares_too_little_is_left_out(synthesized):
 
 @pytest.fixture(scope="module")
 def filmed(tmp_path_factory):
-    """Nine pictures of a person before a wall, five degrees from one to the next."""
+    """Eight pictures of a person before a wall, five degrees from one to the next."""
     folder = tmp_path_factory.mktemp("filmed")
-    for i in range(9):
+    for i in range(8):
         picture = photograph(place_camera(5 * i - 20, 0.05 * np.sin(i), scale=1.5))
         images.write_srgb(folder / f"{i:05d}.jpg", picture, quality=95)
     return folder
@@ -161,7 +161,7 @@ def solved(folder, work, sharpest_first=True):
 
 def test_the_order_in_which_features_are_found_changes_no_byte(filmed, tmp_path, monkeypatch):
     """Threads end in any order; here, once as they do, and once from the last picture to the first."""
-    monkeypatch.setattr(skeleton, "CARRYING_FRAMES", 6)
+    monkeypatch.setattr(skeleton, "CARRYING_FRAMES", 5)
     monkeypatch.setattr(colmap, "FILM_FEATURES", 400)  # of which these small pictures have half
     extract, order = pycolmap.extract_features, []
 
@@ -176,19 +176,19 @@ def test_the_order_in_which_features_are_found_changes_no_byte(filmed, tmp_path,
     # nobody wants, and would get no other either
     monkeypatch.setattr(colmap, "_aside", lambda function, *arguments: function(*arguments))
     reversed_, _ = solved(filmed, tmp_path / "reversed")
-    assert len(registered) == 9 and set(order) == set(registered) and order != sorted(order)
+    assert len(registered) == 8 and set(order) == set(registered) and order != sorted(order)
     assert reversed_ == straight
 
 
 def test_what_lies_beyond_a_chosen_frame_that_is_not_mapped_is_placed_by_those_that_are(filmed, tmp_path, monkeypatch):
     """As at the end of a long film, whose outermost chosen frame shows too little to be mapped."""
-    monkeypatch.setattr(skeleton, "CARRYING_FRAMES", 6)
+    monkeypatch.setattr(skeleton, "CARRYING_FRAMES", 5)
     monkeypatch.setattr(colmap, "FILM_FEATURES", 400)
     monkeypatch.setattr(colmap, "LEAST_CARRIED_SHARE", 0.8)
     map_, chosen = colmap._map, []
     monkeypatch.setattr(colmap, "_map", lambda job, names: chosen.extend(names) or map_(job, names[1:]))
     _, registered = solved(filmed, tmp_path / "work", sharpest_first=False)
-    assert chosen[0] == "00001.jpg" and len(registered) == 9
+    assert chosen[0] == "00001.jpg" and len(registered) == 8
     pairs = read_matches(tmp_path / "work" / "database.db").pairs
     assert {two for one, two in pairs if one == "00000.jpg"} == set(chosen[1:3])
 
