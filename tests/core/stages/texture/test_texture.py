@@ -115,12 +115,8 @@ def test_views_that_are_off_by_pixels_are_aligned(tmp_path, painted):
     offsets = [(3.2, 0.8), (-2.8, -1.2), (3.0, 1.6), (-3.4, 0.0), (2.4, -2.0), (-3.0, 1.6), (2.6, 0.8)]
 
     def shifted(i, picture):
-        return cv2.warpAffine(
-            picture,
-            np.array([[1, 0, offsets[i][0]], [0, 1, offsets[i][1]]]),
-            picture.shape[1::-1],
-            flags=cv2.INTER_CUBIC,
-        )
+        move = np.concatenate([np.eye(2), np.transpose([offsets[i]])], 1)
+        return cv2.warpAffine(picture, move, picture.shape[1::-1], flags=cv2.INTER_CUBIC)
 
     found, confidence, figures = textured(capture_of(tmp_path / "shifted", painted, ROUND, shifted))
     sure = confidence > 0.8
