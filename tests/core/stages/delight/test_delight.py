@@ -67,7 +67,7 @@ def test_light_of_the_sky_is_divided_out_of_two_profiles_that_share_hardly_any_s
 
 def test_sun_with_self_shadows_and_stripes_of_leaves_is_divided_out(tmp_path, brief_search):
     """By the network; and the stripes are found by the delighter Shading, as its card says."""
-    capture = make(tmp_path / "sun.wildcap", (-30, 0), (150, 200))
+    capture = make(tmp_path / "sun.wildcap", (-30, 0), (180, 240))
     render_frames(capture, SUN_COLOUR)
     lit = [view.read() for view in read_views(capture, selected_only=True)]
     render_frames(capture, SUN_COLOUR, stripes=True)

@@ -50,7 +50,7 @@ def test_the_head_that_landmarks_show_lies_under_them_from_where_they_were_seen(
         assert fitted.read() is picture
 
 
-def test_the_light_of_a_photograph_leaves_the_better_for_the_head_that_is_fitted(tmp_path, monkeypatch, brief_search):
+def test_the_light_of_a_photograph_leaves_the_better_for_the_head_that_is_fitted(tmp_path, monkeypatch):
     """Skin of one colour under a sky and a sun from the side: how unlike it comes out, beside the picture and beside
     the network alone."""
     capture, mesh = make(tmp_path / "one", (-10,), (180, 240)), template.load()

@@ -109,9 +109,10 @@ def test_no_face_and_no_motion_are_told(capture, tmp_path):
 
 
 def test_cancel_keeps_the_old_frames(capture, tmp_path):
-    capture.frames.mkdir(parents=True)
-    (capture.frames / "of before.jpg").touch()
+    capture.root.mkdir(parents=True)
     capture.set_source(write_video(tmp_path / "clip.mp4", [moving_face(i) for i in range(4)]))
+    capture.frames.mkdir()
+    (capture.frames / "of before.jpg").touch()
     calls = iter([False] * 2)
     with pytest.raises(CancelledError):
         frames.run(capture, from_json({}), Reporter("frames", cancelled=lambda: next(calls, True)))

@@ -14,7 +14,7 @@ from core.face import template
 from core.geometry import atlas, meshes
 from core.settings.settings import from_json
 from core.stages import registration
-from core.stages.registration import alignment, own_mesh, own_template, render_landmarks
+from core.stages.registration import alignment, carried, own_mesh, own_template, render_landmarks
 from tests.fixtures.egg import egg
 from tests.fixtures.own_heads import lay_over, person
 from tests.fixtures.refused import refused
@@ -143,3 +143,23 @@ def test_a_mesh_without_a_face_is_refused(monkeypatch):
     monkeypatch.setattr(render_landmarks, "_turns", lambda: [np.eye(3)])
     ball = trimesh.creation.icosphere(4, 1.0)
     refused(lambda: render_landmarks.find(meshes.Mesh(ball.vertices, ball.faces), Reporter("x")), "No face was found")
+
+
+def test_parts_without_a_counterpart_follow_the_skin_around_them():
+    skin = trimesh.creation.icosphere(4, 0.1)
+    ball = trimesh.creation.icosphere(2, 0.01)
+    ball.vertices += [0, 0, 0.085]
+    start = np.concatenate([skin.vertices, ball.vertices])
+    label = np.repeat([0, 1], [len(skin.vertices), len(ball.vertices)])
+    moved = skin.vertices * 1.1 + [0.01, 0, 0]
+    final = carried.carry_along(start, label, np.arange(len(skin.vertices)), moved, Reporter("x"))
+    assert np.allclose(final[: len(moved)], moved)
+    assert np.linalg.norm(final[len(moved) :].mean(0) - [0.01, 0, 0.0935]) < 0.001
+    assert np.ptp(np.linalg.norm(final[len(moved) :] - final[len(moved) :].mean(0), axis=1)) < 1e-6
+
+
+def test_it_is_found_however_it_lies():
+    turn = render_landmarks._turns()[7]
+    mesh = template.load()
+    pose = render_landmarks._find_pose(mesh.moved(mesh.vertices @ turn * 37 + [500, -3, 20]), Reporter("x"))
+    assert np.allclose(pose.turn, turn)

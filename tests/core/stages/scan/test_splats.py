@@ -81,7 +81,7 @@ def test_training_lowers_the_depth_error(seen):
     photographs = [p for p, _ in seen]
     losses, start = [], start_of()
     before = splats.train(start, photographs, rasterization_2dgs, "cpu", 0)
-    after = splats.train(start, photographs, rasterization_2dgs, "cpu", 60, lambda step, loss: losses.append(loss))
+    after = splats.train(start, photographs, rasterization_2dgs, "cpu", 45, lambda step, loss: losses.append(loss))
     assert errors_of(before, seen) > 0.001
     assert errors_of(after, seen) < 0.65 * errors_of(before, seen)
     assert np.mean(losses[-10:]) < 0.7 * np.mean(losses[:10])

@@ -24,7 +24,7 @@ REFUSALS = [
     RuntimeError("[enforce fail at alloc_cpu.cpp:117] DefaultCPUAllocator: can't allocate memory: 99 bytes"),
     RuntimeError("DefaultCPUAllocator: not enough memory: you tried to allocate 99 bytes."),
 ]
-RECIPE = Recipe(steps=6, coarse=((2, 0.5),))
+RECIPE = Recipe(steps=6, coarse=((2, 0.5),), updates=60)
 """The map becomes finer within it."""
 
 
@@ -129,7 +129,7 @@ def test_a_network_that_does_not_learn_keeps_less_for_the_same_gradient(norm, mo
 
 def test_the_stage_falls_back_and_its_maps_are_the_same(tmp_path, monkeypatch):
     """The shipped network: plain, failing once, and with the setting."""
-    capture, options = make(tmp_path / "a.wildcap"), {"guidance": "dps", "steps": 3}
+    capture, options = make(tmp_path / "a.wildcap"), {"guidance": "dps", "steps": 4}
     solved(capture, settings(**options))
     plain = {name: (capture.maps / name).read_bytes() for name in MAPS}
     forward, modes = UNet.forward, []
@@ -144,6 +144,6 @@ def test_the_stage_falls_back_and_its_maps_are_the_same(tmp_path, monkeypatch):
     for fails, low in ((True, False), (False, True)):
         modes.clear()
         said = solved(capture, settings(**options, low_memory=low))
-        assert any("step 2 of 3" in line and "low-memory" in line for line in said) == fails
+        assert any("step 2 of 4" in line and "low-memory" in line for line in said) == fails
         assert modes[0] == low and modes[-1]
         assert {name: (capture.maps / name).read_bytes() for name in MAPS} == plain

@@ -14,12 +14,11 @@ from core.capture.stages import MAPS
 from core.face import template
 from core.geometry import raster
 from core.imaging import images
-from core.settings.settings import from_json
 from core.solver.lighting import Lights
 from core.stages import solve
 from core.stages.solve import layout
 from core.stages.solve.maps import Maps
-from core.stages.solve.prior_files import WEIGHTS, load
+from core.stages.solve.prior_files import load
 from tests.fixtures import authors_prior
 from tests.fixtures.authors_prior import bridge, front, other_head, put_own_head, settings
 from tests.fixtures.painted_skin import SIZE, TONE, make, plain_evidence, solved
@@ -144,7 +143,3 @@ def test_another_checkpoint_or_head_makes_the_stage_stale_but_only_with_that_pri
     assert change("", lambda: put_own_head(capture, other_head(5.0))) == change("", edit_config) == ()
     assert change(authors, lambda: put_own_head(capture, other_head(6.0))) == ("own_head.obj",)
     assert change(authors, edit_config) == ("solve.prior",)
-
-
-def test_our_weights_are_named_where_no_prior_is_chosen():
-    assert from_json({}).solve.prior == "" and WEIGHTS.is_file()

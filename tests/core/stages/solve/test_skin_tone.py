@@ -60,7 +60,7 @@ def test_with_a_measured_white_a_tone_is_what_it_is(lightness):
 def test_the_stated_deviation_holds_and_a_measured_white_draws_nobody_to_the_middle():
     """Held-out subjects in random light before random phones."""
     rows = []
-    for seed in range(9000, 9014):
+    for seed in range(9000, 9010):
         for k, scene in enumerate(tones.scenes_of(seed)[:2]):
             shown, card = tones.photographed(scene, np.random.default_rng([seed, k]))
             found = population.estimate_from_scene(shown.best, SCENE)

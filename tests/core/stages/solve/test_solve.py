@@ -157,7 +157,7 @@ def test_a_shadow_that_the_artist_added_to_the_proposal_is_taken_away(capture, f
     inside, around = distance < 0.07, (distance > 0.11) & (distance < 0.15)
     for proposed in (proposal, 0 * proposal):
         images.write_data(capture.shadow_mask_auto, proposed)
-        solved(capture)
+        solved(capture, settings(steps=6))
         diffuse = images.read_linear(capture.maps / "diffuse_albedo.exr")
         step = [np.log(a[inside].mean() / a[around].mean()) for a in (diffuse, mean_face())]
         kept.append((step[0] - step[1]) / np.log(0.5))

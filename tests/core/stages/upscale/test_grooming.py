@@ -3,6 +3,8 @@
 """Hairs grown from masks: along strokes that were painted and as long as they are, covering as much as the mask says, in
 the colour that was mixed in, on the skin and not in it."""
 
+from functools import cache
+
 import cv2
 import numpy as np
 import pytest
@@ -63,15 +65,15 @@ def groomed(cover: float, seed: int = 0) -> dict:
     return grooming.groom(maps, Hair(mask, none, none, none), skin, surface(SIZE), seed)
 
 
-@pytest.fixture(scope="module")
-def hairs() -> dict:
-    return groomed(0.4)
+@cache
+def hairs(cover: float = 0.4) -> dict:
+    return groomed(cover)
 
 
 @pytest.mark.parametrize("cover", [0.2, 0.4])
-def test_hair_covers_as_much_of_the_skin_as_the_mask_says_in_the_colour_that_mixes_to_what_is_seen(hairs, cover):
+def test_hair_covers_as_much_of_the_skin_as_the_mask_says_in_the_colour_that_mixes_to_what_is_seen(cover):
     """Rays along the normals from a centimetre before the brow: how many meet a hair."""
-    texels, grown = brows(), hairs["brows"] if cover == 0.4 else groomed(cover)["brows"]
+    texels, grown = brows(), hairs(cover)["brows"]
     inner = np.flatnonzero(np.abs(np.abs(texels.position[:, 0]) - 32) < 12)  # the ends are thin: hairs leave them
     mesh = joined([template.load(), prisms(grown, sides=6)])
     origins = (texels.position[inner] + 10 * texels.normal[inner]) / 1000
@@ -95,22 +97,22 @@ def test_hair_that_was_hidden_has_the_colour_of_the_rest_and_is_brown_where_none
     assert colour[:, 50:] == pytest.approx(np.broadcast_to(HAIR, (64, 14, 3)), rel=0.01)
 
 
-def test_hair_roots_on_the_skin_in_its_mask_and_stays_outside_of_the_head(hairs):
+def test_hair_roots_on_the_skin_in_its_mask_and_stays_outside_of_the_head():
     skin = SkinSurface(template.load())
-    for part, grown in hairs.items():
+    for part, grown in hairs().items():
         assert np.abs(skin.height(grown.points[:, 0])[0]).max() < 0.002
         assert (skin.height(grown.points[:, 1:].reshape(-1, 3))[0] > -0.0005).mean() > 0.97, part
-    length = np.linalg.norm(np.diff(hairs["brows"].points, axis=1), axis=2).sum(1) * 1000
+    length = np.linalg.norm(np.diff(hairs()["brows"].points, axis=1), axis=2).sum(1) * 1000
     assert 3 < np.median(length) < 9 and length.max() < 13
     for side, sign in ((0, 1), (1, -1)):
         edge = lids.closed_edge(template.load().vertices, side, 0, 0.0)
-        roots = hairs["lashes"].points[:, 0]
+        roots = hairs()["lashes"].points[:, 0]
         own = roots[np.sign(roots[:, 0]) == sign]
         assert np.min(np.linalg.norm(own[:, None] - edge[None], axis=2), 1).max() < 0.0015
 
 
-def test_the_same_seed_gives_the_same_file_without_pickles(tmp_path, hairs):
-    for name, grown in (("a", hairs), ("b", groomed(0.4)), ("c", groomed(0.4, 1))):
+def test_the_same_seed_gives_the_same_file_without_pickles(tmp_path):
+    for name, grown in (("a", hairs()), ("b", groomed(0.4)), ("c", groomed(0.4, 1))):
         grooming.write(tmp_path / f"{name}.npz", grown)
     a, b, c = ((tmp_path / f"{name}.npz").read_bytes() for name in "abc")
     assert a == b != c
@@ -129,6 +131,7 @@ def measured(light: np.ndarray) -> float:
     return stroke_length.measure_stroke_length(light, *growing("beard", SIZE))
 
 
+@cache
 def painted(length_mm: float, across: bool = False) -> np.ndarray:
     """Log albedo [S, S] with 0.7 strokes per mm^2 of that length along the usual way, or across it, over grain."""
     texels, way, texel = growing("beard", SIZE)
@@ -149,11 +152,8 @@ def test_strokes_are_as_long_as_they_were_painted_however_sharp_the_picture_is(l
     assert measured(cv2.GaussianBlur(light, (0, 0), blur) if blur else light) == pytest.approx(length_mm, rel=0.4)
 
 
-def test_strokes_across_the_beard_are_none_of_its_hairs():
+def test_what_lies_beside_the_beard_or_across_it_is_none_of_its_strokes():
     assert measured(painted(3.0, across=True)) == 0
-
-
-def test_what_lies_beside_the_beard_is_none_of_its_strokes():
     for beside in (-1.0, 1.0):
         light = (painted(1.2) + beside * ~growing("beard", SIZE)[0].mask).astype(np.float32)
         assert measured(light) == pytest.approx(1.2, rel=0.4)
