@@ -113,7 +113,7 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     images.write_data(capture.texture_confidence, np.ones((SIZE, SIZE), np.float32))
     images.write_data(capture.shadow_mask, (distance_to(row - 1.5, column + 1.5) < 98).astype(np.float32))
     meshes.write_obj(capture.head, template.load())
-    evidence, recipe = read_evidence(capture, read_head(capture), SIZE), replace(OURS, guidance="proximal", steps=8)
+    evidence, recipe = read_evidence(capture, read_head(capture), SIZE), replace(OURS, guidance="proximal", steps=10)
     start = start_solve(prior, evidence, torch.from_numpy(TONE), 8.0, recipe, make_head_cells)
     assert [(round(m.row / 4), round(m.column / 4)) for m in start.marks] == [(round(row / 4), round(column / 4))]
     sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(0))
