@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from skimage.data import astronaut
 
-from core.capture.messages import Problem
 from core.face import faces
 from core.imaging import images
+from tests.fixtures.refused import refused
 
 PORTRAITS = Path(__file__).resolve().parents[4] / "shared" / "data" / "portraits"
 
@@ -89,8 +89,7 @@ def test_an_opencv_that_cannot_read_the_networks_is_named(monkeypatch, picture):
     monkeypatch.setattr(faces.cv2.dnn, "readNetFromTFLite", refuse)
     faces._net.cache_clear()
     try:
-        with pytest.raises(Problem, match="face_detection"):
-            faces.detect(picture)
+        refused(lambda: faces.detect(picture), "face_detection")
     finally:
         faces._net.cache_clear()
 

@@ -29,6 +29,7 @@ IDENTITY = np.random.default_rng(3).normal(0, 0.8, len(template_landmarks().basi
 PERSON = template_landmarks().shape(IDENTITY)
 """A person's landmarks: a head of the identity space, of its own face."""
 REPORT = Reporter("cameras")
+RECORDS = [FrameRecord(name=f"{i}.jpg", source=f"IMG {i}.jpg", sharpness=1.0, selected=True) for i in range(4)]
 
 
 def seen(view, rng) -> Face:
@@ -59,10 +60,9 @@ def off(model, views: dict) -> tuple[np.ndarray, np.ndarray]:
     true = [views[image.name] for image in found]
     centres, truth = np.array([image.projection_center() for image in found]), np.array([view.centre for view in true])
     scale, rotation, shift = similarity(centres, truth)
-    cosines = [
-        (np.trace(view.rotation @ rotation @ image.cam_from_world().rotation.matrix().T) - 1) / 2
-        for image, view in zip(found, true, strict=True)
-    ]
+    turned = [view.rotation @ rotation for view in true]
+    placed = [image.cam_from_world().rotation.matrix() for image in found]
+    cosines = (np.einsum("nij,nij->n", turned, placed) - 1) / 2
     away = np.linalg.norm(scale * centres @ rotation.T + shift - truth, axis=1) / 0.55
     return away, np.degrees(np.arccos(np.clip(cosines, -1, 1)))
 
@@ -198,12 +198,9 @@ def test_of_two_ways_the_one_that_places_more_frames_wins_unless_nothing_but_the
 @pytest.mark.parametrize(("time_s", "source"), [(None, "photographs"), (0.5, "frames")])
 @pytest.mark.parametrize("blurred", [False, True])
 def test_frames_that_did_not_fit_are_named_by_their_source(scene, time_s, source, blurred):
-    model = model_of(dict(list(scene[1].items())[:3]), (FOCAL,))
-    records = [
-        FrameRecord(name=f"{i}.jpg", source=f"IMG {i}.jpg", time_s=time_s, selected=True, sharpness=sharpness)
-        for i, sharpness in enumerate((1.0, 1.0, 1.0, 0.1 if blurred else 1.0))
-    ]
-    report = Reporter("cameras")
+    model, report = model_of(dict(list(scene[1].items())[:3]), (FOCAL,)), Reporter("cameras")
+    records = [replace(record, time_s=time_s) for record in RECORDS]
+    records[3] = replace(records[3], sharpness=0.1 if blurred else 1.0)
     _left_out(Solved(model, "plain", None, {}), records, {each.name: each.shown for each in records}, report)
     (finding,) = report.findings
     assert finding["frames"] == ["IMG 3.jpg"] and source in finding["problem"]
@@ -214,8 +211,7 @@ def test_a_mirrored_photograph_is_named_by_its_source(scene, monkeypatch):
     monkeypatch.setattr(solving, "find_mirrored", lambda names, *others: ["0.jpg"])
     monkeypatch.setattr(solving, "camera_groups", lambda records, folder: [])
     monkeypatch.setattr(solving, "resect", lambda *given: None)
-    records = [FrameRecord(name=f"{i}.jpg", source=f"IMG {i}.jpg", sharpness=1.0, selected=True) for i in range(4)]
-    _, fault = solving._by_face(records, SimpleNamespace(frames=None), scene[2], Matches(), None, REPORT)
+    _, fault = solving._by_face(RECORDS, SimpleNamespace(frames=None), scene[2], Matches(), None, REPORT)
     assert "IMG 0.jpg" in fault
 
 

@@ -167,13 +167,8 @@ def test_damaged_plys(tmp_path, vertices, faces, body):
 
 def test_meshes_that_are_none_are_not_written(tmp_path):
     points, faces = np.eye(3), np.array([[0, 1, 2]])
-    wrong = [
-        Mesh(points * np.nan, faces),
-        Mesh(points, faces + 1),
-        Mesh(points, faces[:0]),
-        Mesh(points, faces, np.full((3, 2), np.inf), faces),
-    ]
-    for mesh in wrong:
+    infinite = Mesh(points, faces, np.full((3, 2), np.inf), faces)
+    for mesh in (Mesh(points * np.nan, faces), Mesh(points, faces + 1), Mesh(points, faces[:0]), infinite):
         for write, name in ((meshes.write_obj, "head.obj"), (meshes.write_ply, "scan.ply")):
             refused(lambda write=write, name=name, mesh=mesh: write(tmp_path / name, mesh), name, "was not written")
             assert not list(tmp_path.iterdir())
@@ -186,11 +181,14 @@ def test_a_pipe_under_a_meshs_name_is_refused_and_not_waited_for(tmp_path, name,
     refused(lambda: read(tmp_path / name), name)
 
 
-def test_pictures_of_frames_have_their_shape(tmp_path):
-    view = SimpleNamespace(width=64, height=64, name="1.jpg")
-    for side, right in ((1, False), (7, False), (8, True), (64, True), (128, True)):
-        images.write_srgb(tmp_path / "1.png", np.ones((side, side, 3)))
-        if right:
-            assert frame_pictures.read_picture(tmp_path / "1.png", view, "delit").shape == (64, 64, 3)
-        else:
-            refused(lambda: frame_pictures.read_picture(tmp_path / "1.png", view, "delit"), "1.png", f"{side} x {side}")
+@pytest.mark.parametrize(("side", "right"), [(1, False), (7, False), (8, True), (64, True), (128, True)])
+def test_pictures_of_frames_have_their_shape(tmp_path, side, right):
+    def read():
+        view = SimpleNamespace(width=64, height=64, name="1.jpg")
+        return frame_pictures.read_picture(tmp_path / "1.png", view, "delit")
+
+    images.write_srgb(tmp_path / "1.png", np.ones((side, side, 3)))
+    if right:
+        assert read().shape == (64, 64, 3)
+    else:
+        refused(read, "1.png", f"{side} x {side}")

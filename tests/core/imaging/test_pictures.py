@@ -26,22 +26,13 @@ PICTURE = np.stack([*np.meshgrid(np.arange(32) * 7, np.arange(40) * 5), np.full(
 @pytest.mark.parametrize(
     ("mode", "suffix", "options"),
     [
-        ("L", ".png", {}),
-        ("1", ".png", {}),
-        ("P", ".png", {}),
-        ("RGB", ".png", {}),
-        ("RGBA", ".png", {}),
-        ("LA", ".png", {}),
-        ("I;16", ".png", {}),
+        *((mode, ".png", {}) for mode in ("L", "1", "P", "RGB", "RGBA", "LA", "I;16")),
         ("L", ".jpg", {"quality": 95}),
         ("RGB", ".JPG", {"quality": 95, "progressive": True}),
         ("RGB", ".jpeg", {"quality": 95, "subsampling": 0}),
-        ("CMYK", ".tif", {}),
+        *(("CMYK", ".tif", {}), ("P", ".tif", {}), ("L", ".bmp", {}), ("RGB", ".tga", {})),
         ("RGB", ".tiff", {"compression": "tiff_lzw"}),
         ("L", ".TIF", {"compression": "tiff_deflate"}),
-        ("P", ".tif", {}),
-        ("L", ".bmp", {}),
-        ("RGB", ".tga", {}),
     ],
 )
 def test_a_picture_of_any_mode_has_its_colours_and_as_a_mask_their_mean(place, mode, suffix, options):
@@ -61,17 +52,13 @@ def test_a_picture_of_any_mode_has_its_colours_and_as_a_mask_their_mean(place, m
 @pytest.mark.parametrize(
     ("suffix", "kind", "channels", "attributes"),
     [
-        (".exr", "half", 3, {"compression": "zip"}),
+        *((".exr", "half", 3, {"compression": packing}) for packing in ("zip", "dwaa")),
         (".exr", "float", 3, {"compression": "piz"}),
         (".exr", "half", 1, {"compression": "none"}),
         (".exr", "half", 4, {"compression": "zips"}),
         (".EXR", "float", 1, {"compression": "rle"}),
-        (".exr", "half", 3, {"compression": "dwaa"}),
-        (".png", "uint16", 3, {}),
-        (".png", "uint16", 1, {}),
-        (".tif", "float", 1, {}),
-        (".tif", "uint16", 3, {}),
-        (".tif", "half", 3, {}),
+        *((".png", "uint16", channels, {}) for channels in (1, 3)),
+        *((".tif", kind, channels, {}) for kind, channels in (("float", 1), ("uint16", 3), ("half", 3))),
         (".png", "uint8", 3, {"png:compressionLevel": 0}),
     ],
 )
@@ -143,14 +130,10 @@ def test_values_that_are_no_numbers_are_neither_read_nor_written(tmp_path, value
     refused(lambda: images.read_linear(tmp_path / "texture.exr"), "texture.exr", "holds values")
     pixels = np.ones((4, 4, 4), np.float32)
     pixels[1, 2, 0] = value
-    for write, name in (
-        (images.write_srgb, "a.png"),
-        (images.write_linear, "a.exr"),
-        (images.write_data, "a.png"),
-        (images.write_packed, "a.png"),
-    ):
-        refused(lambda write=write, name=name: write(tmp_path / name, pixels), name, "was not written")
-        assert not (tmp_path / name).exists()
+    for write in (images.write_srgb, images.write_linear, images.write_data, images.write_packed):
+        path = tmp_path / ("a.exr" if write is images.write_linear else "a.png")
+        refused(lambda write=write, path=path: write(path, pixels), path.name, "was not written")
+        assert not path.exists()
 
 
 def test_a_refused_picture_leaves_the_file_before_it(tmp_path):

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The shadow's edge under a rough mask: found where it is, as wide as it is, and left alone where there is none."""
 
+from itertools import product
+
 import cv2
 import numpy as np
 import pytest
@@ -40,10 +42,8 @@ def test_alpha_lies_on_the_penumbra(width):
     assert after < 0.01 and after < 0.1 * before
     assert np.abs(edge.alpha - shadow)[np.abs(distance) > width / 2 + 4].max() < 0.05  # no halo to either side
     assert np.abs(edge.colour - TAKEN / TAKEN.mean()).max() < 0.05
-    assert (
-        edge.on_edge[np.abs(distance) < BAND_TEXELS - 2].min() > 0.9
-        and edge.on_edge[np.abs(distance) > BAND_TEXELS + 4].max() == 0
-    )
+    assert edge.on_edge[np.abs(distance) < BAND_TEXELS - 2].min() > 0.9
+    assert edge.on_edge[np.abs(distance) > BAND_TEXELS + 4].max() == 0
 
 
 def test_an_edge_at_the_end_of_the_search_has_its_penumbra_and_deeper_all_stays():
@@ -62,18 +62,11 @@ def test_a_mask_without_a_shadow_stays_as_it_was_painted():
     assert np.array_equal(edge.alpha, painted) and edge.on_edge.max() == 0
 
 
-@pytest.mark.parametrize(
-    "painted",
-    [
-        np.zeros((64, 64), np.float32),
-        np.ones((64, 64), np.float32),
-        np.eye(64, dtype=np.float32) * (np.arange(64) == 30),
-    ],
-)
-def test_any_mask_gives_a_finite_alpha(painted):
-    light = np.random.default_rng(0).uniform(0.2, 1, (64, 64, 3))
-    for weight in (0, 1):
-        alpha = place(light, painted, np.full((64, 64), weight, np.float32), 16.0).alpha
+def test_any_mask_gives_a_finite_alpha():
+    light, ones = np.random.default_rng(0).uniform(0.2, 1, (64, 64, 3)), np.ones((64, 64), np.float32)
+    one_texel = np.eye(64, dtype=np.float32) * (np.arange(64) == 30)
+    for painted, weight in product((0 * ones, ones, one_texel), (0 * ones, ones)):
+        alpha = place(light, painted, weight, 16.0).alpha
         assert np.isfinite(alpha).all() and alpha.min() >= 0 and alpha.max() <= 1
 
 
@@ -92,9 +85,8 @@ def test_a_step_of_another_colour_is_not_the_shadows():
 
 def test_deep_strokes_are_never_taken_back():
     """A lit island in the middle of a large stroke: the artist said shadow."""
-    size = SIZE
-    y, x = (np.mgrid[:size, :size] + 0.5) * 2
-    shadow = ((np.hypot(x - 500, y - 500) < 200) & (np.hypot(x - 500, y - 500) > 60)).astype(np.float32)
-    painted = soften_mask((np.hypot(x - 500, y - 500) < 206).astype(np.float32))
-    edge = place(1 - shadow[..., None] * TAKEN, painted, np.ones((size, size), np.float32), 2.0)
-    assert edge.alpha[np.hypot(x - 500, y - 500) < 206 - INWARD_TEXELS - BAND_TEXELS].min() == 1
+    y, x = (np.mgrid[:SIZE, :SIZE] + 0.5) * 2
+    away = np.hypot(x - 500, y - 500)
+    shadow, painted = ((away < 200) & (away > 60)).astype(np.float32), soften_mask((away < 206).astype(np.float32))
+    edge = place(1 - shadow[..., None] * TAKEN, painted, np.ones((SIZE, SIZE), np.float32), 2.0)
+    assert edge.alpha[away < 206 - INWARD_TEXELS - BAND_TEXELS].min() == 1

@@ -1,13 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The spherical harmonics against quadrature over the sphere, for both kinds of arrays."""
+"""Spherical harmonics against quadrature, and the sky's light on a ball, whose answer is known."""
 
 import numpy as np
 import pytest
-
-pytest.importorskip("torch")
 import torch
+import trimesh
 
+from core.geometry.meshes import Mesh
+from core.geometry.raster import RayCaster
+from core.light.skylight import ambient_occlusion, radiance_transfer
 from core.light.spherical_harmonics import (
     GAMMA_BANDS,
     LAMBERT,
@@ -17,6 +19,8 @@ from core.light.spherical_harmonics import (
     sh_basis,
     sh_polynomials,
 )
+
+pytest.importorskip("torch")
 
 
 def quadrature(rows: int = 200, columns: int = 400) -> tuple[np.ndarray, np.ndarray]:
@@ -67,3 +71,13 @@ def test_both_kinds_of_arrays_and_both_axes_agree(bands):
     assert np.array_equal(np.moveaxis(planes, 0, -1), sh_basis(np.moveaxis(directions, 0, -1), bands))
     tensor = sh_basis(torch.from_numpy(directions), bands, axis=0)
     assert tensor.dtype == torch.float32 and np.allclose(tensor.numpy(), planes, rtol=1e-6, atol=1e-6)
+
+
+def test_the_transfer_of_an_open_ball_is_lamberts_and_nothing_is_occluded():
+    ball = trimesh.creation.icosphere(2, radius=0.1)
+    normals = ball.vertices / 0.1
+    transfer = radiance_transfer(RayCaster(Mesh(ball.vertices, ball.faces)), ball.vertices, normals, rays=512)
+    assert np.allclose(transfer, sh_basis(normals) * per_function(LAMBERT), atol=0.03)
+    assert np.allclose(UNIFORM * transfer[:, 0], 1, atol=0.03) and np.allclose(
+        ambient_occlusion(transfer), 1, atol=0.03
+    )

@@ -1,13 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Spherical harmonic shading against quadrature, the grid's interpolation, the closed-form global light, and what holds
-it to an even one."""
+"""Spherical harmonic shading against quadrature, the grid's interpolation, the closed-form global light, and what a local
+light costs."""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 import torch
 
 from core.solver.lighting import Lights, Shader, constant_light, fit_global, interpolation_matrix, shading_basis
+from core.solver.lights import light_loss
+from core.solver.objective import Observation
+from core.solver.recipes import OURS
 
 
 def sphere(rows: int = 100, columns: int = 200):
@@ -47,10 +52,9 @@ def test_shading_is_the_cosine_integral_of_the_radiance():
 
 def test_constant_light_shades_a_sphere_evenly():
     directions, _ = sphere(20, 40)
-    shader = Shader(directions.float(), torch.zeros(20, 40), (2, 2))
-    lights = Lights(constant_light(torch.tensor([0.5, 1.0, 2.0])), torch.zeros(3, 9, 2, 2), torch.ones(3))
-    assert torch.allclose(shader.total(lights).amin((1, 2)), torch.tensor([0.5, 1.0, 2.0]), atol=1e-6)
-    assert torch.allclose(shader.total(lights).amax((1, 2)), torch.tensor([0.5, 1.0, 2.0]), atol=1e-6)
+    shader, colour = Shader(directions.float(), torch.zeros(20, 40), (2, 2)), torch.tensor([0.5, 1.0, 2.0])
+    lights = Lights(constant_light(colour), torch.zeros(3, 9, 2, 2), torch.ones(3))
+    assert torch.allclose(shader.total(lights), colour[:, None, None].expand(3, 20, 40), atol=1e-6)
 
 
 @pytest.mark.parametrize("coloured", [True, False])
@@ -94,3 +98,60 @@ def test_global_light_is_found_in_closed_form():
     texture = albedo * torch.einsum("ck,khw->chw", gamma, basis)
     texture[:, :10], weight[:10] = 9.0, 0.0  # what is masked must not matter
     assert torch.allclose(fit_global(texture, albedo, basis, weight, ridge=1e-9), gamma, atol=1e-4)
+
+
+SIZE = 24
+MISSING = 0.2
+RECIPE = replace(OURS, faint=1.4)
+
+
+@dataclass
+class Drawn:
+    """A shader whose lights are the pictures themselves: a warm main light and what the grid takes of it under M."""
+
+    taken: torch.Tensor
+    box_alpha: torch.Tensor
+    empty: bool = False
+    box: tuple = (slice(None), slice(None))
+
+    def main(self, lights):
+        return torch.tensor([1.2, 1.0, 0.7])[:, None, None].expand(3, SIZE, SIZE)
+
+    def local(self, lights):
+        return self.taken * self.box_alpha
+
+    def unmodulated(self, lights):
+        return self.taken
+
+    def total(self, lights):
+        return self.main(lights) + self.local(lights)
+
+
+def cost(taken: torch.Tensor, tone: float, shadow: float = 0.0, **recipe) -> float:
+    """The loss of a grid that takes so much light from an even skin, filmed with `shadow` of the light missing in M."""
+    mask = torch.zeros(SIZE, SIZE)
+    mask[6:18, 6:18] = 1
+    ring = torch.zeros(SIZE, SIZE)
+    ring[4:20, 4:20] = 1
+    ring[8:16, 8:16] = 0
+    shader = Drawn(taken, mask)
+    denoised = torch.full((1, 7, SIZE, SIZE), 2 * tone - 1)
+    texture = tone * shader.main(None) * (1 - shadow * mask)
+    o = Observation(
+        texture, torch.ones(SIZE, SIZE), torch.ones(SIZE, SIZE), torch.zeros(1), shader, ring, missing=MISSING
+    )
+    return float(light_loss(None, denoised, o, replace(RECIPE, **recipe)))
+
+
+def test_every_term_weighs_as_much_beside_the_data_on_dark_skin_as_on_light():
+    grid = 0.1 * torch.randn(3, SIZE, SIZE, generator=torch.Generator().manual_seed(0)) - 0.6
+    light, dark = (cost(grid, tone, shadow=0.5) / tone**2 for tone in (0.45, 0.03))
+    assert dark == pytest.approx(light, rel=1e-4)
+
+
+def test_light_is_drawn_to_a_share_of_the_main_light_in_each_colour():
+    main = torch.tensor([1.2, 1.0, 0.7])[:, None, None].expand(3, SIZE, SIZE)
+    alone = {"seam": 0.0, "smooth": 0.0}
+    assert cost(-MISSING * main, 0.3, shadow=MISSING, **alone) == pytest.approx(0, abs=1e-9)
+    grey = torch.full((3, SIZE, SIZE), -MISSING)
+    assert cost(grey, 0.3, shadow=MISSING, **alone) > 0.01

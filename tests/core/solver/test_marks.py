@@ -7,15 +7,14 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-import pycolmap
 import pytest
 import torch
 
 from core.capture.capture import Capture
 from core.face import template
 from core.face.head import read_head
-from core.geometry import frame_pictures, meshes, raster
-from core.geometry.views import View
+from core.geometry import frame_pictures, meshes
+from core.geometry.views import read_views
 from core.imaging import images
 from core.light.shadow_edges import penumbra
 from core.solver.extensions.marks import Mark, find_marks, is_unlike_shadow
@@ -26,6 +25,7 @@ from core.stages.solve import maps, witnesses
 from core.stages.solve.capture_evidence import read_evidence
 from core.stages.solve.head_cells import make_head_cells
 from core.stages.solve.prior_files import load
+from tests.fixtures.photographed_head import write_cameras, write_frames_json
 
 SIZE = 512
 TEXEL = 1024 / SIZE
@@ -80,51 +80,34 @@ def test_a_speck_of_shadow_is_told_by_its_colour():
 
 def test_views_confirm_what_they_all_show(tmp_path, monkeypatch):
     """Three cameras before the face: two dots in all pictures but that the second is in one of them only."""
-    capture = Capture(tmp_path)
-    head = template.load()
-    meshes.write_obj(capture.head, head)
-    capture.cameras.mkdir()
-    capture.frames.mkdir()
-    capture.frames_json.write_text("{}", encoding="utf-8")
-    face, bary = raster.rasterize_uv(head, 256)
-    points = raster.interpolate(head.vertices, head.faces, face, bary)
-    marks = [Mark(80.0, 110.0, 2.0, (-0.5, -0.8, -1.0)), Mark(80.0, 146.0, 2.0, (-0.5, -0.8, -1.0))]
-    there = np.array([points[int(m.row), int(m.column)] for m in marks])
-    camera = pycolmap.Camera(model="PINHOLE", width=400, height=400, params=[800.0, 800.0, 200.0, 200.0])
-    rotation = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-    views = []
-    for i, x in enumerate((-0.1, 0.0, 0.1)):
-        view = View(
-            f"{i}.jpg",
-            capture.frames / f"{i}.jpg",
-            camera,
-            rotation,
-            -rotation @ np.array([x, there[0, 1] - 0.5, there[0, 2]]),
-            True,
-        )
+    capture, names = Capture(tmp_path), [f"{i}.jpg" for i in range(3)]
+    meshes.write_obj(capture.head, template.load())
+    head = read_head(capture)
+    marks = [Mark(80.0, column, 2.0, (-0.5, -0.8, -1.0)) for column in (110.0, 146.0)]
+    there = head.interpolate(head.mesh.vertices, 256)[80, [110, 146]]
+    write_frames_json(capture, names)
+    write_cameras(capture.cameras, names, (-11, 0, 11), target=there[0], size=(400, 400), focal=800.0)
+    views = read_views(capture)
+    for i, view in enumerate(views):
         picture = np.full((400, 400, 3), 0.5, np.float32)
-        pixels, _ = view.project(there)
-        for pixel in pixels[: 2 if i == 0 else 1]:
+        for pixel in view.project(there)[0][: 2 if i == 0 else 1]:
             cv2.circle(picture, tuple(int(v) for v in pixel), 5, (0.2, 0.2, 0.2), -1)
         images.write_srgb((capture.delit / view.name).with_suffix(".png"), picture)
-        views.append(view)
-    monkeypatch.setattr(frame_pictures, "read_views", lambda capture: views)
-    assert witnesses.confirm_marks(capture, read_head(capture), marks, 256) == marks[:1]
+    assert witnesses.confirm_marks(capture, head, marks, 256) == marks[:1]
     monkeypatch.setattr(frame_pictures, "read_views", lambda capture: views[:1])
-    # one view is too few to deny what the texture shows
-    assert witnesses.confirm_marks(capture, read_head(capture), marks, 256) == marks
+    assert witnesses.confirm_marks(capture, head, marks, 256) == marks, "one view is too few to deny the texture"
 
 
 def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     """A mole of 8 texels, as large as a cell of the light's grid, in a shadow with a hard edge under a mask that is 8
     texels too large and beside it."""
     prior, capture = load(), Capture(tmp_path)
-    covered = torch.from_numpy(template.mask("skin", SIZE).copy())
-    face = tint_face(prior.mean_face, torch.from_numpy(TONE), covered)
-    albedo = (face[0, :3].permute(1, 2, 0).numpy() + 1) / 2
+    face = tint_face(prior.mean_face, torch.from_numpy(TONE), torch.from_numpy(template.mask("skin", SIZE).copy()))
     row, column = round(0.56 * SIZE), round(0.655 * SIZE)
+    albedo = (face[0, :3].permute(1, 2, 0).numpy() + 1) / 2
     albedo = albedo * skin(0.04) / TONE * np.exp(-spot(row, column, 8) * MELANIN)
-    distance = distance_to(row, column) - 90
+    away = distance_to(row, column)
+    distance = away - 90
     light = 1 - penumbra(distance, np.float32(TEXEL))[..., None] * TAKEN
     images.write_linear(capture.texture, (albedo * light).astype(np.float32))
     images.write_data(capture.texture_confidence, np.ones((SIZE, SIZE), np.float32))
@@ -135,20 +118,17 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     assert [(round(m.row / 4), round(m.column / 4)) for m in start.marks] == [(round(row / 4), round(column / 4))]
     sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(0))
     result = maps.finish_maps(sampler.sample(start.observations, start.state), evidence, start)
-    solved = result.diffuse
 
     def contrast(image):
-        log, away = np.log(np.maximum(image, 1e-3)).mean(-1), distance_to(row, column)
+        log = np.log(np.maximum(image, 1e-3)).mean(-1)
         return log[(away > 9) & (away < 14)].mean() - log[away < 2.8].mean()
 
-    assert 0.8 < contrast(solved) / contrast(albedo) < 1.2
-    error = np.log(np.maximum(solved, 1e-3) / albedo).mean(-1)
+    assert 0.8 < contrast(result.diffuse) / contrast(albedo) < 1.2
+    error = np.log(np.maximum(result.diffuse, 1e-3) / albedo).mean(-1)
     # six inside the shadow, six outside
     rings = [error[(distance >= d) & (distance < d + 3)].mean() for d in range(-18, 18, 3)]
     inside, outside = np.mean(rings[:4]), np.mean(rings[-4:])
     assert abs(outside - inside) < 0.15 * -np.log(1 - TAKEN).mean()
-    usual = (prior.mean_face[6].numpy() + 1) / 2
-    # no photograph tells it: no grain of chance
-    assert np.abs(result.specular - cv2.resize(usual, (SIZE, SIZE), interpolation=cv2.INTER_AREA)).max() < 0.05
-    # no light or dark outline
-    assert max(rings) - max(inside, outside) < 0.06 and min(rings) - min(inside, outside) > -0.06
+    assert max(rings) - max(inside, outside) < 0.06 and min(rings) - min(inside, outside) > -0.06, "no outline"
+    usual = cv2.resize((prior.mean_face[6].numpy() + 1) / 2, (SIZE, SIZE), interpolation=cv2.INTER_AREA)
+    assert np.abs(result.specular - usual).max() < 0.05, "no photograph tells it: no grain of chance"

@@ -91,18 +91,15 @@ def test_the_paper_and_its_code_remove_a_known_shadow_too(name):
 
 def test_the_lights_move_as_far_on_a_finer_map_as_on_a_coarse_one():
     """On even maps the sizes differ in the number of texels alone, which Adam ignores."""
-    found = []
+    up, seen, found = torch.tensor([0.0, 0, 1])[:, None, None], {}, []
+    for factor in (1, 2):
+        o = observation(torch.full((3, SIZE // factor, SIZE // factor), 0.2))
+        seen[factor] = replace(o, shader=Shader(up.expand(3, *o.weight.shape), 0 * o.weight, (4, 4)))
+    recipe = Recipe(steps=20, phases=(("main", 0.0, 1.0),), updates=60, guidance="proximal")
     for coarse in ((), ((2, 1.0),)):
-        seen = {factor: observation(torch.full((3, SIZE // factor, SIZE // factor), 0.2)) for factor in (1, 2)}
-        up = torch.tensor([0.0, 0, 1])[:, None, None]
-        seen = {
-            factor: replace(o, shader=Shader(up.expand(3, *o.weight.shape), 0 * o.weight, (4, 4)))
-            for factor, o in seen.items()
-        }
-        phases = (("main", 0.0, 1.0),)
         sampler = Sampler(
             lambda x, sigma, coords: torch.zeros_like(x),
-            Recipe(steps=20, coarse=coarse, phases=phases, updates=60, guidance="proximal"),
+            replace(recipe, coarse=coarse),
             seed_noise(0),
             fit=lambda state, denoised, *rest: update_lights(state, 0 * denoised, *rest),
         )

@@ -11,7 +11,7 @@ import pycolmap
 import pytest
 
 from core.capture.frame_records import PHOTOGRAPHS, VIDEO, FrameRecord, Frames
-from core.capture.messages import Problem, Reporter
+from core.capture.messages import Reporter
 from core.imaging import images
 from core.stages.cameras.calibration import import_cameras, read_cameras
 from core.stages.cameras.importers.realityscan import turned
@@ -111,36 +111,35 @@ def colmap_model() -> pycolmap.Reconstruction:
 @pytest.fixture(scope="module")
 def shot(tmp_path_factory):
     """The frames and their folder, as made from photographs of those names."""
-    folder = tmp_path_factory.mktemp("frames")
-    records = []
+    folder, records = tmp_path_factory.mktemp("frames"), []
+    record = FrameRecord(name="", sharpness=1.0, selected=True)
     for i, name in enumerate(NAMES):
         images.write_srgb(folder / f"{i:05d}.jpg", np.zeros((FRAME_HEIGHT, FRAME_WIDTH, 3), np.float32))
-        records.append(
-            FrameRecord(name=f"{i:05d}.jpg", source=f"{name}.jpeg", video_frame=i, sharpness=1.0, selected=True)
-        )
+        records.append(replace(record, name=f"{i:05d}.jpg", source=f"{name}.jpeg", video_frame=i))
     return Frames(tuple(records), PHOTOGRAPHS), folder
 
 
+NEWER = "#name,x,y,alt,yaw,pitch,roll,f_35mm,px_norm,py_norm,k1,k2,k3,k4,t1,t2"
+FILES = {
+    "metashape": ("cameras.xml", metashape_xml()),
+    "realityscan": ("cameras.csv", realityscan_csv()),
+    "realityscan_2": ("new.csv", realityscan_csv(NEWER)),
+    "blender": ("cameras.json", blender_json()),
+}
+
+
 def written(tmp_path, kind: str):
-    if kind.startswith("colmap"):
-        path = tmp_path / "model" / ("sparse/0" if kind == "colmap_bin" else ".")
-        path.mkdir(parents=True)
-        (colmap_model().write_binary if kind == "colmap_bin" else colmap_model().write_text)(str(path))
-        return tmp_path / "model"
-    name, text = {
-        "metashape": ("cameras.xml", metashape_xml),
-        "realityscan": ("cameras.csv", realityscan_csv),
-        "blender": ("cameras.json", blender_json),
-        "realityscan_2": (
-            "new.csv",
-            lambda: realityscan_csv("#name,x,y,alt,yaw,pitch,roll,f_35mm,px_norm,py_norm,k1,k2,k3,k4,t1,t2"),
-        ),
-    }[kind]
-    (tmp_path / name).write_text(text(), encoding="utf-8")
-    return tmp_path / name
+    if kind in FILES:
+        name, text = FILES[kind]
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        return tmp_path / name
+    path = tmp_path / "model" / ("sparse/0" if kind == "colmap_bin" else ".")
+    path.mkdir(parents=True)
+    (colmap_model().write_binary if kind == "colmap_bin" else colmap_model().write_text)(str(path))
+    return tmp_path / "model"
 
 
-@pytest.mark.parametrize("kind", ["colmap_bin", "colmap_txt", "metashape", "realityscan", "realityscan_2", "blender"])
+@pytest.mark.parametrize("kind", ["colmap_bin", "colmap_txt", *FILES])
 def test_known_cameras_come_back_exactly(kind, tmp_path, shot):
     frames, folder = shot
     model = import_cameras(written(tmp_path, kind), frames, folder, Reporter("cameras"))
@@ -199,20 +198,19 @@ def test_wrong_files_are_refused_with_the_reason(name, text, says, tmp_path):
 
 def test_cameras_of_other_pictures_are_refused(tmp_path, shot):
     frames, folder = shot
-    path = written(tmp_path, "realityscan")
+    path, turned_folder = written(tmp_path, "realityscan"), tmp_path / "turned"
     path.write_text(path.read_text().replace("IMG", "DSC"))
-    with pytest.raises(Problem, match="0 of the 4 frames.*DSC_0007.*img_0007"):
-        import_cameras(path, frames, folder, Reporter("cameras"))
-    turned_folder = tmp_path / "turned"
+    words = "0 of the 4 frames", "DSC_0007", "img_0007"
+    refused(lambda: import_cameras(path, frames, folder, Reporter("cameras")), *words)
     for record in frames.records:
         images.write_srgb(turned_folder / record.name, np.zeros((FRAME_WIDTH, FRAME_HEIGHT, 3), np.float32))
-    with pytest.raises(Problem, match="1200 x 1600.*480 x 360") as caught:
-        import_cameras(written(tmp_path, "blender"), frames, turned_folder, Reporter("cameras"))
-    assert "EXIF" in caught.value.remedy
-    with pytest.raises(Problem, match="no file or folder"):
-        read_cameras(tmp_path / "gone.xml")
-    with pytest.raises(Problem, match="holds no COLMAP model"):
-        read_cameras(turned_folder)
+    path = written(tmp_path, "blender")
+    problem = refused(
+        lambda: import_cameras(path, frames, turned_folder, Reporter("cameras")), "1200 x 1600", "480 x 360"
+    )
+    assert "EXIF" in problem.remedy
+    refused(lambda: read_cameras(tmp_path / "gone.xml"), "no file or folder")
+    refused(lambda: read_cameras(turned_folder), "holds no COLMAP model")
     assert len(read_cameras(written(tmp_path, "colmap_txt") / "images.txt")) == 4  # what a file selector gives
 
 
@@ -238,15 +236,11 @@ def test_damaged_cameras_are_refused(tmp_path, damage):
     refused(lambda: read_cameras(path), "cameras.json")
 
 
-def test_a_name_may_end_in_any_number(tmp_path):
-    sound = json.loads(blender_json())
+def test_a_name_may_end_in_any_number_and_a_colmap_lens_of_next_to_nothing_is_refused(tmp_path):
+    sound, model = json.loads(blender_json()), colmap_model()
     sound["cameras"][0]["name"] = "a" + "1" * 5000
     (tmp_path / "cameras.json").write_text(json.dumps(sound))
     assert len(read_cameras(tmp_path / "cameras.json")) == len(NAMES)
-
-
-def test_a_colmap_lens_of_next_to_nothing_is_refused(tmp_path):
-    model = colmap_model()
     model.cameras[1].params = [FOCAL, 1e-9, *model.cameras[1].params[2:]]
     model.write_binary(str(tmp_path))
     refused(lambda: read_cameras(tmp_path), "focal length")

@@ -16,7 +16,7 @@ from skimage.data import astronaut
 
 from core.capture.capture import Capture
 from core.capture.frame_records import read_frames
-from core.capture.messages import CancelledError, Problem, Reporter
+from core.capture.messages import CancelledError, Reporter
 from core.face import faces
 from core.geometry.views import read_views
 from core.imaging import images
@@ -25,8 +25,9 @@ from core.stages import cameras, frames
 from core.stages.cameras.landmarks import find_landmarks
 from core.stages.cameras.solving import Solved
 from core.stages.cameras.world import PUPILS_M, HeadFrame, find_head, intersect_rays
-from research.benchmarks.head.cameras_against_truth import similarity
+from research.benchmarks.head.cameras_against_truth import compare, similarity
 from research.people.painted_head import photograph, place_camera
+from tests.fixtures.refused import refused
 
 DATA = Path(__file__).resolve().parents[5] / "shared" / "data"
 
@@ -52,7 +53,7 @@ def solve(capture: Capture, source: Path, report: Reporter | None = None, **sett
 @pytest.fixture(scope="module")
 def solved(tmp_path_factory) -> tuple[Capture, np.ndarray, dict]:
     root = tmp_path_factory.mktemp("caméras d'été")
-    centres = photographed(root / "les photos", np.linspace(-32, 32, 8))
+    centres = photographed(root / "les photos", np.linspace(-32, 32, 7))
     capture = Capture(root / "a face.wildcap")
     return capture, centres, solve(capture, root / "les photos")
 
@@ -60,7 +61,7 @@ def solved(tmp_path_factory) -> tuple[Capture, np.ndarray, dict]:
 def test_known_cameras_are_found_in_the_heads_world(solved):
     """The face stands upright, looks along -Y, and its eyes are 63 mm apart around the origin."""
     capture, true, figures = solved
-    assert figures["frames_registered"] == 8 and figures["features"] == "plain"
+    assert figures["frames_registered"] == 7 and figures["features"] == "plain"
     assert figures["reprojection_error_px"] < 1
     assert figures["angular_coverage_deg"] == pytest.approx(64, abs=8)
     assert capture.picture("cameras", "world").is_file()
@@ -70,7 +71,7 @@ def test_known_cameras_are_found_in_the_heads_world(solved):
     off = np.linalg.norm(scale * centres @ rotation.T + shift - true, axis=1)
     assert np.median(off) < 0.005 and scale == pytest.approx(1, abs=0.06)  # in metres
     assert np.degrees(Rotation.from_matrix(rotation).magnitude()) < 8
-    for view in (views[2], views[6]):
+    for view in (views[1], views[5]):
         face = faces.detect(view.read())
         eyes = np.array([face.landmarks[list(eye), :2].mean(0) for eye in (faces.RIGHT_EYE, faces.LEFT_EYE)])
         expected, _ = view.project(np.array([[-0.0315, 0, 0], [0.0315, 0, 0]]))
@@ -91,17 +92,14 @@ def test_rays_meet_robustly():
 
 def test_frames_without_common_structure_are_refused(tmp_path):
     rng = np.random.default_rng(3)
-    folder = tmp_path / "photos"
-    folder.mkdir()
     for i in range(4):
         noise = cv2.resize(rng.random((40, 30, 3), dtype=np.float32), (240, 320))
         if i == 0:
-            noise[60:260, 20:220] = np.ascontiguousarray(astronaut()[30:230, 120:320]).astype(np.float32) / 255
-        images.write_srgb(folder / f"{i}.png", np.clip(noise, 0, 1))
+            noise[60:260, 20:220] = astronaut()[30:230, 120:320] / np.float32(255)
+        images.write_srgb(tmp_path / "photos" / f"{i}.png", np.clip(noise, 0, 1))
     capture = Capture(tmp_path / "face.wildcap")
-    with pytest.raises(Problem, match="do not fit together") as caught:
-        solve(capture, folder, features="plain")
-    assert "Film again" in caught.value.remedy and not capture.cameras.exists()
+    problem = refused(lambda: solve(capture, tmp_path / "photos", features="plain"), "do not fit together")
+    assert "Film again" in problem.remedy and not capture.cameras.exists()
 
 
 def test_a_film_whose_camera_hardly_moved_is_refused(solved, tmp_path, monkeypatch):
@@ -109,58 +107,52 @@ def test_a_film_whose_camera_hardly_moved_is_refused(solved, tmp_path, monkeypat
     shutil.copytree(solved[0].frames, again.frames)
     frames_json = json.loads(again.frames_json.read_text(encoding="utf-8"))
     again.frames_json.write_text(json.dumps(frames_json | {"kind": "video"}))
-    model = pycolmap.Reconstruction(str(solved[0].cameras))
     head = HeadFrame(pycolmap.Sim3d(), 1.0, 0.01, PUPILS_M, 0.001)
-    monkeypatch.setattr(cameras, "solve", lambda *given: Solved(model, "plain", head, {}))
+    still = Solved(pycolmap.Reconstruction(str(solved[0].cameras)), "plain", head, {})
+    monkeypatch.setattr(cameras, "solve", lambda *given: still)
     monkeypatch.setattr(cameras, "LEAST_COVERAGE_DEG", 90.0)
-    with pytest.raises(Problem, match="moved only 6[0-9] degrees"):
-        cameras.run(again, from_json({}), Reporter("cameras"))
+    refused(lambda: cameras.run(again, from_json({}), Reporter("cameras")), "moved only 6", " degrees")
     assert not again.cameras.exists()
 
 
 def test_a_head_that_moves_before_a_still_background_is_told_from_one_at_rest(solved, tmp_path):
     """Cameras that hold for the background, but in every second picture the face has gone aside by a third of its
     width."""
-    capture, _, _ = solved
-    records = read_frames(capture).records
-    model = pycolmap.Reconstruction(str(capture.cameras))
+    capture, records = solved[0], read_frames(solved[0]).records
     for i, record in enumerate(records):
-        picture = images.read_srgb(capture.frames / record.name)
         aside = round((record.face_box[2] - record.face_box[0]) / 3) if i % 2 else 0
-        images.write_srgb(tmp_path / record.name, np.roll(picture, aside, 1))
+        images.write_srgb(tmp_path / record.name, np.roll(images.read_srgb(capture.frames / record.name), aside, 1))
+    model, report = pycolmap.Reconstruction(str(capture.cameras)), Reporter("cameras")
     still, moved = (
-        find_head(model, find_landmarks(records, folder, Reporter("cameras")), 0.063)
-        for folder in (capture.frames, tmp_path)
+        find_head(model, find_landmarks(records, folder, report), 0.063) for folder in (capture.frames, tmp_path)
     )
-    assert still.still and still.error_px < 5
-    assert not moved.still
+    assert still.still and still.error_px < 5 and not moved.still
 
 
 def test_cancel_takes_effect_at_once_and_keeps_the_old_cameras(solved):
-    capture, _, _ = solved
-    before = {p.name: p.stat().st_mtime_ns for p in capture.cameras.iterdir()}
-    started = time.monotonic()
+    def times() -> dict:
+        return {path.name: path.stat().st_mtime_ns for path in solved[0].cameras.iterdir()}
+
+    before, started = times(), time.monotonic()
+    report = Reporter("cameras", cancelled=lambda: time.monotonic() - started > 0.5)
     with pytest.raises(CancelledError):
-        cameras.run(capture, from_json({}), Reporter("cameras", cancelled=lambda: time.monotonic() - started > 0.5))
-    assert time.monotonic() - started < 2.5
-    assert {p.name: p.stat().st_mtime_ns for p in capture.cameras.iterdir()} == before
+        cameras.run(solved[0], from_json({}), report)
+    assert time.monotonic() - started < 2.5 and times() == before
 
 
-def test_sixteen_frames_of_a_real_video_against_its_truth(tmp_path):
+def test_some_frames_of_a_real_video_against_its_truth(tmp_path):
     """Sparse and small, so the tolerance is five times what all 96 frames give."""
     truth = DATA / "lps_sun"
     if not truth.is_dir():
         pytest.skip("lps_sun is not at hand")
-    from research.benchmarks.head.cameras_against_truth import compare
-
     capture = Capture(tmp_path / "lps.wildcap")
     capture.root.mkdir()
     capture.set_source(truth / "capture.mp4")
-    settings = from_json({"frames": {"max_frames": 16}})
+    settings = from_json({"frames": {"max_frames": 12}})
     frames.run(capture, settings, Reporter("frames"))
     cameras.run(capture, settings, Reporter("cameras"))
     figures = compare(capture, truth)
-    assert figures["registered"] >= 14
+    assert figures["registered"] >= 11
     assert figures["centre_error_median_percent"] < 0.6
     # the scan holds its chin up: registration finds 7.5 degrees
     assert figures["up_tilt_deg"] < 13 and abs(figures["facing_off_deg"]) < 5

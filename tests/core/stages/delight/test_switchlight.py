@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The SwitchLight delighter against a server on this machine that speaks its protocol, with all its ways to fail. The
-live service was not asked."""
+"""The SwitchLight delighter against a server on this machine that speaks its protocol, with all its ways to fail, and what
+it is not sent: nothing without consent, a key and a network. The live service was not asked."""
 
 from __future__ import annotations
 
+import json
 import time
 from email.utils import formatdate
 from importlib import import_module
@@ -12,7 +13,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from core.capture import switchlight_api
+from core.capture import consent, switchlight_api
 from core.capture.messages import CancelledError, Problem, Reporter
 from core.imaging import images
 from core.settings.settings import from_json
@@ -43,17 +44,14 @@ def test_the_selected_frames_go_out_and_come_back_at_their_size(sendable, serve)
     run(sendable, SETTINGS, report)
     assert report.figures["switchlight_calls"] == 3 and report.figures["switchlight_credits"] == 3.0
     assert any(calls == 0 and "3 credits" in text for calls, text in messages), "the price, before the first call"
-    written = sorted(path.name for path in sendable.delit.iterdir())
-    assert written == ["00000.png", "00001.png", "00002.png"], "and nothing about shadows"
-    assert images.size(sendable.delit / "00001.png") == SIZE
-    assert images.read_srgb(sendable.delit / "00001.png")[40, 30] * 255 == pytest.approx([200, 150, 120], abs=0.6)
+    names = [f"0000{i}.png" for i in range(3)]
+    assert sorted(path.name for path in sendable.delit.iterdir()) == names, "and nothing about shadows"
+    assert images.size(sendable.delit / names[1]) == SIZE
+    assert images.read_srgb(sendable.delit / names[1])[40, 30] * 255 == pytest.approx([200, 150, 120], abs=0.6)
+    expected = {"key": KEY, "preview": "false", "auto_key": "true", "type": "image/png", "file": "frame.png"}
     for call in server.calls:
-        assert (call["key"], call["preview"], call["auto_key"]) == (KEY, "false", "true")
-        assert (call["type"], call["file"]) == ("image/png", "frame.png")
-        assert "WildCap" in call["agent"]
-    assert {call["picture"] for call in server.calls} == {
-        (sendable.frames / f"0000{i}.png").read_bytes() for i in range(3)
-    }
+        assert call | expected == call and "WildCap" in call["agent"]
+    assert {call["picture"] for call in server.calls} == {(sendable.frames / name).read_bytes() for name in names}
     run(sendable, SETTINGS, again := Reporter("delight"))
     assert len(server.calls) == 3 and again.figures["switchlight_credits"] == 0
     assert again.figures["switchlight_frames_kept_before"] == 3
@@ -119,6 +117,7 @@ def test_a_refusal_is_reported_and_not_repeated(sendable, serve, refusal, words)
     with pytest.raises(Problem, match=words) as refused:
         delight(sendable)
     assert KEY not in str(refused.value) and len(server.calls) <= 3 and not server.charged
+    assert KEY not in repr(switchlight_calls.Account("https://x", KEY))
 
 
 def test_answers_are_kept_when_the_service_stays_busy(sendable, serve):
@@ -206,5 +205,65 @@ def test_the_service_may_ask_for_time_in_seconds_or_until_a_date(header, seconds
     assert switchlight_calls._after(text) == (seconds if seconds is None else pytest.approx(seconds, abs=2))
 
 
-def test_an_account_is_shown_without_its_key():
-    assert KEY not in repr(switchlight_calls.Account("https://x", KEY))
+def test_nothing_is_sent_without_consent_a_key_or_a_network(sendable, serve, monkeypatch):
+    server = serve()
+    with pytest.raises(Problem, match=r"consent: 3 frames .* 3 credits"):
+        delight(sendable)
+    agree(sendable)
+    monkeypatch.setenv(switchlight_api.OFFLINE_VARIABLE, "1")
+    with pytest.raises(Problem, match="offline"):
+        delight(sendable)
+    monkeypatch.delenv(switchlight_api.OFFLINE_VARIABLE)
+    for bad in ("", f"{KEY}\r\nX: y", f"{KEY} {KEY}", f"{KEY}…"):
+        monkeypatch.setenv(switchlight_api.KEY_VARIABLE, bad)
+        with pytest.raises(Problem, match="key") as refused:
+            delight(sendable)
+        assert KEY not in str(refused.value)
+    assert server.calls == []
+
+
+def test_consent_holds_for_these_pictures_here_and_nothing_else(sendable, serve, monkeypatch, tmp_path):
+    def given(capture=sendable, preview=False, frames=None) -> bool:
+        return consent.is_given(capture, consent.sending(capture, preview, frames))
+
+    first, picture = serve(), sendable.frames / "00001.png"
+    agree(sendable)
+    assert given()
+    other = make(tmp_path / "other.wildcap", selected=4)
+    other.consent.write_bytes(sendable.consent.read_bytes())
+    assert not given(other), "copied to another capture of the same frames"
+    with pytest.raises(Problem, match="consent"):
+        consent.require(other, consent.sending(other, False))
+    kept = picture.read_bytes()
+    picture.write_bytes(standin.png([[(9, 9, 9)] * 60] * 80))
+    assert not given(), "another picture under the same name"
+    picture.write_bytes(kept)
+    assert given()
+    assert not given(frames=[f"0000{i}.png" for i in range(4)]), "one more frame"
+    assert not given(preview=True), "other answers"
+    serve()
+    assert given(), "the same machine"
+    monkeypatch.setenv(switchlight_api.BASE_VARIABLE, "https://elsewhere.example/v1")
+    assert not given(), "another machine"
+    monkeypatch.setenv(switchlight_api.BASE_VARIABLE, first.url)
+    sendable.consent.write_text('{"frames": 3}')
+    assert not given(), "damaged"
+    monkeypatch.setenv(consent.GIVEN_VARIABLE, consent.by_flag(other)[consent.GIVEN_VARIABLE])
+    with pytest.raises(Problem, match="consent"):
+        consent.require(sendable, consent.sending(sendable, False))
+    agree(sendable)
+    consent.withdraw(sendable)
+    assert not given() and not sendable.consent.exists()
+    assert KEY not in json.dumps(consent.sending(sendable, False).frames)
+
+
+def test_the_key_goes_to_safe_addresses_only(sendable, serve, monkeypatch):
+    monkeypatch.setenv(switchlight_api.BASE_VARIABLE, "http://sdk.example/v1")
+    with pytest.raises(Problem, match="safe"):
+        delight(sendable)
+    elsewhere = serve()
+    server = serve((307, {"Location": f"{elsewhere.url}/acquire/albedo"}, {}))
+    agree(sendable)
+    with pytest.raises(Problem, match="307"):
+        delight(sendable)
+    assert elsewhere.calls == [] and 1 <= len(server.calls) <= 3, "a redirection is not followed"

@@ -44,8 +44,8 @@ def test_known_gains_are_recovered():
 
 
 def test_a_steady_exposure_is_left_alone():
-    assert (gains_of([content_of(exposed(picture)) for picture in walk(8)]) == 1).all()
-    assert (gains_of([content_of(np.full((60, 80, 3), 0.5, np.float32))] * 3) == 1).all(), "nothing to compare"
+    for pictures in (walk(8), [np.full((60, 80, 3), 0.5, np.float32)] * 3):
+        assert (gains_of([content_of(exposed(picture)) for picture in pictures]) == 1).all()
 
 
 def noise(rng, cells: int, width: int, height: int) -> np.ndarray:
@@ -72,13 +72,13 @@ def turning_head(angle: float, skin: np.ndarray, wall: np.ndarray) -> tuple[np.n
 @pytest.mark.parametrize("textured", [True, False], ids=["a textured wall", "an empty wall"])
 @pytest.mark.parametrize("drifting", [False, True], ids=["steady", "drifting"])
 def test_a_head_that_turns_into_the_shade_is_not_drift(monkeypatch, textured, drifting):
-    rng, count = np.random.default_rng(3), 18
+    rng, count = np.random.default_rng(3), 12
     skin = noise(rng, 8, 1200, 480)
     wall = noise(rng, 9, WIDTH, HEIGHT) if textured else np.ones((HEIGHT, WIDTH), np.float32)
-    true = np.exp(drifting * 0.25 * np.sin(np.arange(count) / 6))[:, None] * np.ones(3)
+    true = np.exp(drifting * 0.25 * np.sin(np.arange(count) / 4))[:, None] * np.ones(3)
     contents = []
     for i in range(count):
-        picture, inside = turning_head(0.045 * i, skin, wall)
+        picture, inside = turning_head(0.0675 * i, skin, wall)
         mask = inside.astype(np.float32)
         monkeypatch.setattr(faces, "segment_person", lambda small, mask=mask: cv2.resize(mask, small.shape[1::-1]))
         contents.append(content_of(exposed(picture, true[i])))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames: the right ones of a video, the sharp ones chosen; and every kind of bad source refused."""
+"""Frames: the right ones of a video, the sharp ones chosen; every kind of bad source, and a capture with glasses, refused."""
 
 from fractions import Fraction
 
@@ -11,10 +11,13 @@ import pytest
 from skimage.data import astronaut
 
 from core.capture.frame_records import FrameRecord
-from core.capture.messages import CancelledError, Reporter
+from core.capture.messages import CancelledError, Problem, Reporter
+from core.face import faces
+from core.face.glasses import sureness
 from core.imaging import images
 from core.settings.settings import from_json
 from core.stages import frames
+from core.stages.frames.glasses import SURE_LOG_ODDS, judge
 from core.stages.frames.select import select_views, sharpness, turns
 from core.stages.frames.source import fitted
 from core.stages.frames.video import read_video
@@ -22,7 +25,6 @@ from tests.fixtures.moving_face import moving_face, number_in, refused, take
 
 
 def write_video(path, pictures):
-    path.parent.mkdir(parents=True, exist_ok=True)
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=Fraction(24))
         stream.height, stream.width = pictures[0].shape[:2]
@@ -34,7 +36,7 @@ def write_video(path, pictures):
 
 
 def test_frames_are_those_the_record_says(capture, tmp_path):
-    source = write_video(tmp_path / "une entrée" / "IMG 0001.MOV", [moving_face(i) for i in range(50)])
+    source = write_video(tmp_path / "entrée 0001.MOV", [moving_face(i) for i in range(50)])
     record, report = take(capture, source, max_frames=8, views=4)
     assert record["kind"] == "video"
     assert [f["video_frame"] for f in record["frames"]] == np.round(np.linspace(0, 49, 8)).astype(int).tolist()
@@ -86,20 +88,15 @@ def test_a_damaged_recording_gives_what_is_there(capture, tmp_path):
 def test_bad_sources_are_refused(capture, tmp_path, folder):
     refused(capture, "", "No video")
     refused(capture, tmp_path / "gone.mp4", "no video")
-    for name, content, words in (
-        ("empty.mp4", b"", "empty"),
-        ("text.mp4", b"This is a shopping list, not a video.\n" * 50, "no video"),
-        ("zeros.mp4", bytes(2000), "no video"),
-    ):
-        (tmp_path / name).write_bytes(content)
-        refused(capture, tmp_path / name, words)
+    for content, words in ((b"", "empty"), (b"A shopping list.\n" * 99, "no video"), (bytes(2000), "no video")):
+        (tmp_path / "bad.mp4").write_bytes(content)
+        refused(capture, tmp_path / "bad.mp4", words)
     refused(capture, folder, "no photographs")
     (folder / "a.dng").write_bytes(b"raw")
     refused(capture, folder, "raw files")
     (folder / "b.avif").write_bytes(b"avif")
     refused(capture, folder, "are raw and AVIF files")
-    for name in ("0.png", "1.png"):
-        (folder / name).write_bytes(b"cut off while it was copied")
+    (folder / "0.png").write_bytes(b"cut off while it was copied")
     refused(capture, folder, "None of the photographs")
 
 
@@ -116,8 +113,63 @@ def test_cancel_keeps_the_old_frames(capture, tmp_path):
     capture.set_source(write_video(tmp_path / "clip.mp4", [moving_face(i) for i in range(4)]))
     capture.frames.mkdir()
     (capture.frames / "of before.jpg").touch()
-    calls = iter([False] * 2 + [True] * 100)
+    calls = iter([False] * 2)
     with pytest.raises(CancelledError):
-        frames.run(capture, from_json({}), Reporter("frames", cancelled=lambda: next(calls)))
+        frames.run(capture, from_json({}), Reporter("frames", cancelled=lambda: next(calls, True)))
     assert [path.name for path in capture.frames.iterdir()] == ["of before.jpg"]
     assert not [p for p in capture.root.iterdir() if p.name.startswith(".")]
+
+
+FACE = astronaut().astype(np.float32)[:300, 60:400] / 255
+
+
+def with_rims(srgb: np.ndarray, thick: int = 4) -> np.ndarray:
+    """Round black rims with a bridge and temples, painted over a face."""
+    marks, over = faces.detect(srgb).landmarks[:, :2], srgb.copy()
+    middles = [marks[list(corners)].mean(0) for corners in (faces.RIGHT_EYE, faces.LEFT_EYE)]
+    reach = 0.36 * np.linalg.norm(middles[1] - middles[0])
+    for middle in middles:
+        circle = np.round(middle + [0, 0.15 * reach]).astype(int).tolist()
+        cv2.circle(over, circle, round(reach), (0.03, 0.03, 0.03), thick, cv2.LINE_AA)
+    across = (middles[1] - middles[0]) / np.linalg.norm(middles[1] - middles[0])
+    ends = [
+        (middles[0] + reach * across, middles[1] - reach * across),
+        (middles[0] - reach * across, marks[234]),
+        (middles[1] + reach * across, marks[454]),
+    ]
+    for a, b in np.round(ends).astype(int).tolist():
+        cv2.line(over, a, b, (0.03, 0.03, 0.03), thick, cv2.LINE_AA)
+    return over
+
+
+def test_rims_are_told_from_a_bare_face_and_a_capture_with_glasses_is_refused(capture, folder):
+    worn = with_rims(FACE)
+    assert sureness(FACE, faces.detect(FACE)) < -1 and sureness(worn, faces.detect(worn)) > SURE_LOG_ODDS
+    for k in range(3):
+        images.write_srgb(folder / f"{k}.png", worn[10 * k : 10 * k + 260, 20 * k : 20 * k + 280])
+    refused(capture, folder, "wears glasses in 3 of 3 frames")
+
+
+@pytest.mark.parametrize(
+    ("odds", "no_glasses", "finding"),
+    [
+        ([9.0, 9.0], False, True),
+        ([9.0, 9.0, 1.0, 1.0, 9.0], False, True),
+        ([0.7] * 10, False, True),
+        ([9.0] * 5 + [-1.0] * 5, False, True),
+        ([], False, False),
+        ([float("nan")] * 4, False, False),
+        ([-2.0] * 10 + [9.0] * 4, False, False),
+        ([9.0] * 4, True, False),
+    ],
+)
+def test_doubt_is_a_warning_and_few_frames_or_the_artist_refuse_nothing(odds, no_glasses, finding):
+    report = Reporter("frames")
+    judge(odds, no_glasses, report)
+    assert ["glasses" in each["problem"] for each in report.findings] == [True] * finding
+
+
+def test_the_remedy_says_how_to_overrule():
+    with pytest.raises(Problem) as raised:
+        judge([9.0] * 4, False, Reporter("frames"))
+    assert "frames.no_glasses" in raised.value.remedy

@@ -80,6 +80,7 @@ def test_five_photographs_far_apart_make_a_head(fitted):
 def test_one_side_makes_a_draft_with_open_eyes_and_the_artists_chin(fitted, tmp_path, monkeypatch):
     """Nothing can be lifted from views a degree apart: the straightest alone tells where the eyes are."""
     monkeypatch.setattr(registration.eyes, "opening", lambda seen: 0.35)
+    monkeypatch.setattr(unscanned, "STEPS", 3)
     capture, report = shot(tmp_path / "selfies.wildcap", (-1, 0, 1), points=0, rise=0.0), Reporter("registration")
     chin = np.array(json.loads(fitted[0].landmarks.read_text())["points"]["199"]) + [0, 0, -0.006]
     capture.landmarks_artist.write_text(json.dumps({"points": {"199": chin.tolist()}}))

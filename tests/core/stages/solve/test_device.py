@@ -43,19 +43,11 @@ def machine(monkeypatch, **devices) -> list[str]:
     ("card", "taken", "reason"),
     [
         ((MAP + 0.01, 0.1), "cuda", "cuda takes 0.10 s for one pass of the network, the CPU 1.00 s."),
-        ((MAP, 1.5), "cpu", "cuda is slower than the CPU: 1.50 s against 1.00 s"),
-        ((MAP + 0.5, 0.1), "cpu", "cuda computes something else than the CPU."),
-        ((MAP * float("nan"), 0.1), "cpu", "cuda computes something else than the CPU."),
-        (
-            RuntimeError("no kernel image is available\nfor execution"),
-            "cpu",
-            "does not run the network (RuntimeError: no kernel image is available).",
-        ),
-        (
-            torch.cuda.OutOfMemoryError("CUDA out of memory."),
-            "cpu",
-            "does not run the network (OutOfMemoryError: CUDA out of memory).",
-        ),
+        ((MAP, 1.5), "cpu", "slower than the CPU: 1.50 s against 1.00 s"),
+        ((MAP + 0.5, 0.1), "cpu", "something else"),
+        ((MAP * float("nan"), 0.1), "cpu", "something else"),
+        (RuntimeError("no kernel\nfor execution"), "cpu", "(RuntimeError: no kernel)."),
+        (torch.cuda.OutOfMemoryError("CUDA out of memory."), "cpu", "(OutOfMemoryError: CUDA out of memory)."),
     ],
 )
 def test_a_card_is_taken_where_it_computes_the_same_and_faster(monkeypatch, card, taken, reason):
@@ -64,14 +56,12 @@ def test_a_card_is_taken_where_it_computes_the_same_and_faster(monkeypatch, card
     assert proof.device == taken and reason in proof.reason
 
 
-def test_the_second_card_is_tried_after_the_first_and_all_of_it_once(monkeypatch):
+def test_the_second_card_is_tried_after_the_first_all_of_it_once_and_without_one_nothing_is_computed(monkeypatch):
     tried = machine(monkeypatch, cpu=(MAP, 1.0), cuda=RuntimeError("broken"), mps=(MAP, 0.2))
     assert device.prove().device == device.prove().device == "mps" and tried == ["cpu", "cuda", "mps"]
-
-
-def test_without_a_card_nothing_is_computed(monkeypatch):
-    assert machine(monkeypatch) == []
-    assert device.prove() == device.Proof("cpu", "PyTorch finds no graphics card that it can use.")
+    device.prove.cache_clear()
+    tried = machine(monkeypatch)
+    assert device.prove() == device.Proof("cpu", "PyTorch finds no graphics card that it can use.") and tried == []
 
 
 def test_the_pass_is_one_of_the_shipped_network_there_and_back(monkeypatch):

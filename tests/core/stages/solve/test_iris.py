@@ -23,11 +23,11 @@ from research.people.lifelike import eyes, shape  # noqa: E402
 from research.people.painted_head import place_camera  # noqa: E402
 
 SEED, SKIN = 4, np.array([0.42, 0.26, 0.19])
-AZIMUTHS = (-24, -12, 0, 12, 24)
+AZIMUTHS = (-24, -8, 8, 24)
 
 
 class Painted:
-    """A head of one tone with open eyes, seen by five cameras."""
+    """A head of one tone with open eyes, seen by four cameras."""
 
     def __init__(self, folder, colour, tone=SKIN, lit=(1.0, 0.8, 0.5), blink: int | None = None):
         closed = shape.person_mesh(SEED)

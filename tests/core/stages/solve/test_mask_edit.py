@@ -4,6 +4,7 @@
 impossible is said."""
 
 import shutil
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +17,11 @@ from core.capture.messages import CancelledError
 from core.capture.stages import MAPS
 from core.imaging import images
 from core.stages.solve.window import find_window
-from tests.fixtures.painted_skin import make, settings, solved
+from tests.fixtures import painted_skin
+from tests.fixtures.painted_skin import make, solved
 
 EDIT = (slice(60, 68), slice(40, 50))
+settings = partial(painted_skin.settings, steps=5)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -36,7 +39,7 @@ def whole(tmp_path_factory) -> Capture:
     texture = images.read_linear(capture.texture)
     texture[EDIT] *= 0.5
     images.write_linear(capture.texture, texture)
-    solved(capture)
+    solved(capture, settings())
     return capture
 
 

@@ -19,43 +19,20 @@ from core.solver.prior.prior import make_coordinates
 from core.stages.solve import prior_files, released
 from core.stages.solve.refusals import tell_refusals
 from tests.fixtures.authors_prior import weights_of, write
+from tests.fixtures.refused import refused
 
+
+def model_of(depths: list[int], channels: list[int], attention: list[bool], mapping: int, **more) -> dict:
+    return {"depths": depths, "channels": channels, "self_attn_depths": attention, "mapping_out": mapping, **more}
+
+
+POSENC = model_of([1, 2, 3], [32, 64, 96], [False, True, True], 24, patch_size=2, sigma_data=0.5, has_variance=True)
+FOUR_LEVELS = model_of([1, 1, 2, 1], [32, 32, 64, 64], [True, False, True, False], 16, skip_stages=1)
+UNWRAPPED = model_of([2], [32], [False], 16, patch_size=4, augment_wrapper=False, mapping_cond_dim=5, sigma_data=1.0)
 CONFIGS = {
-    "posenc, patches of 2, attention, variance": (
-        {
-            "depths": [1, 2, 3],
-            "channels": [32, 64, 96],
-            "self_attn_depths": [False, True, True],
-            "patch_size": 2,
-            "mapping_out": 24,
-            "sigma_data": 0.5,
-            "has_variance": True,
-        },
-        {"type": "posenc", "pos_enc_freq": 4},
-    ),
-    "four levels, the first left out, defaults": (
-        {
-            "depths": [1, 1, 2, 1],
-            "channels": [32, 32, 64, 64],
-            "self_attn_depths": [True, False, True, False],
-            "skip_stages": 1,
-            "mapping_out": 16,
-        },
-        {"type": "coord"},
-    ),
-    "noise, patches of 4, no wrapper, own mapping": (
-        {
-            "depths": [2],
-            "channels": [32],
-            "self_attn_depths": [False],
-            "patch_size": 4,
-            "mapping_out": 16,
-            "augment_wrapper": False,
-            "mapping_cond_dim": 5,
-            "sigma_data": 1.0,
-        },
-        {"type": "noise"},
-    ),
+    "posenc, patches of 2, attention, variance": (POSENC, {"type": "posenc", "pos_enc_freq": 4}),
+    "four levels, the first left out, defaults": (FOUR_LEVELS, {"type": "coord"}),
+    "noise, patches of 4, no wrapper, own mapping": (UNWRAPPED, {"type": "noise"}),
 }
 COND_CHANNELS = {"coord": 2, "posenc": 18, "noise": 3}
 DEFAULTS, NOISE = (CONFIGS[name] for name in list(CONFIGS)[1:])
@@ -139,35 +116,34 @@ def test_a_checkpoint_of_another_kind_gives_what_its_formulas_give(tmp_path, nam
 
 
 def test_noise_is_read_where_the_folder_carries_it_and_asked_for_where_not(tmp_path):
+    def load():
+        return prior_files.load(tmp_path, dtype=torch.float32)
+
     write(tmp_path, *NOISE, weights_of(*NOISE, prefix=""))
-    x = torch.zeros(1, 7, 16, 16)
-    coords = make_coordinates(64, slice(8, 24), slice(32, 48), centred=False)
+    x, coords = torch.zeros(1, 7, 16, 16), make_coordinates(64, slice(8, 24), slice(32, 48), centred=False)
     with pytest.raises(Problem, match="fixed random map"), tell_refusals():
-        prior_files.load(tmp_path, dtype=torch.float32).of_tone()(x, 1.0, coords)
+        load().of_tone()(x, 1.0, coords)
     noise = np.random.default_rng(0).normal(size=(3, 64, 64)).astype(np.float32)
     np.save(tmp_path / released.NOISE_FILE, noise)
-    loaded = prior_files.load(tmp_path, dtype=torch.float32)
-    window = torch.from_numpy(noise[None, :, 8:24, 32:48])
-    wanted = denoise(loaded.network, x, torch.tensor([1.0]), Condition(window))
-    assert (loaded.of_tone()(x, 1.0, coords) - wanted).abs().max() < 1e-6
+    window = Condition(torch.from_numpy(noise[None, :, 8:24, 32:48]))
+    wanted = denoise(load().network, x, torch.tensor([1.0]), window)
+    assert (load().of_tone()(x, 1.0, coords) - wanted).abs().max() < 1e-6
     for wrong in (noise[:2], noise[:, :8], noise.astype(np.int32), np.where(noise > 2, np.nan, noise)):
         np.save(tmp_path / released.NOISE_FILE, wrong)
-        with pytest.raises(Problem, match="of shape"):
-            prior_files.load(tmp_path)
+        refused(lambda: load(), "of shape")
 
 
 def promising_header() -> bytes:
     header = io.BytesIO()
-    promised = {"descr": "<f4", "fortran_order": False, "shape": (3, 1 << 20, 1 << 20)}
-    np.lib.format.write_array_header_1_0(header, promised)
+    shape = {"descr": "<f4", "fortran_order": False, "shape": (3, 1 << 20, 1 << 20)}
+    np.lib.format.write_array_header_1_0(header, shape)
     return header.getvalue()
 
 
 @pytest.mark.parametrize("begins", [b"", b"PK\x03\x04 and more", b"\x93NUMPY\x01\x00 and more", promising_header()])
 def test_a_noise_map_that_is_damaged_or_promises_more_than_it_holds_is_refused(tmp_path, begins):
     (tmp_path / released.NOISE_FILE).write_bytes(begins)
-    with pytest.raises(Problem, match="noise.npy cannot be read"):
-        released.read_noise(tmp_path)
+    refused(lambda: released.read_noise(tmp_path), "noise.npy cannot be read")
 
 
 def test_what_the_config_says_of_noise_levels_is_kept(tmp_path):
@@ -197,32 +173,30 @@ def test_other_models_are_told_apart(good, entry, value, match):
     config = json.loads((good / "config.json").read_text())
     config["model"] |= {entry: value, "cross_attn_depths": [True] * 4}
     (good / "config.json").write_text(json.dumps(config))
-    with pytest.raises(Problem, match=match):
-        prior_files.load(good)
+    refused(lambda: prior_files.load(good), match)
 
 
 def test_damaged_files_are_problems(good):
-    whole = (good / "ckpt.pth").read_bytes()
+    def load():
+        return prior_files.load(good)
+
+    checkpoint, config = good / "ckpt.pth", good / "config.json"
+    whole = checkpoint.read_bytes()
     for content in (whole[: len(whole) // 2], b"", b"no checkpoint", pickle.dumps({"model_ema": print}, 2)):
-        (good / "ckpt.pth").write_bytes(content)
-        with pytest.raises(Problem, match="cannot be read as weights"):
-            prior_files.load(good)
-    torch.save({"model_ema": 3}, good / "ckpt.pth")
-    with pytest.raises(Problem, match="no state dict"):
-        prior_files.load(good)
-    (good / "ckpt.pth").unlink()
-    with pytest.raises(Problem, match="holds no ckpt"):
-        prior_files.load(good)
+        checkpoint.write_bytes(content)
+        refused(load, "cannot be read as weights")
+    torch.save({"model_ema": 3}, checkpoint)
+    refused(load, "no state dict")
+    checkpoint.unlink()
+    refused(load, "holds no ckpt")
     for text in ("{", "[]", "{}", '{"model": {"input_channels": 7}}'):
-        (good / "config.json").write_text(text)
-        with pytest.raises(Problem, match="does not describe a prior"):
-            prior_files.load(good)
-    with pytest.raises(Problem, match="does not describe a prior"):
-        prior_files.load(good / "nowhere")
+        config.write_text(text)
+        refused(load, "does not describe a prior")
+    refused(lambda: prior_files.load(good / "nowhere"), "does not describe a prior")
 
 
 class Calls:
-    """What a hostile checkpoint holds: unpickled, it would make a file."""
+    """A hostile checkpoint: unpickled, it would make a file."""
 
     def __init__(self, path):
         self.path = path
@@ -233,6 +207,5 @@ class Calls:
 
 def test_code_in_a_checkpoint_is_never_run(good, tmp_path):
     torch.save({"model_ema": Calls(tmp_path / "made")}, good / "ckpt.pth")
-    with pytest.raises(Problem, match="Nothing in it was run"):
-        prior_files.load(good)
+    refused(lambda: prior_files.load(good), "Nothing in it was run")
     assert not (tmp_path / "made").exists()

@@ -6,6 +6,7 @@ delivered."""
 import json
 import shutil
 from dataclasses import replace
+from itertools import product
 
 import cv2
 import numpy as np
@@ -35,9 +36,8 @@ def painted(mesh: Mesh, size: int, values=lambda points, face, bary: colour_at(p
     """values(points, face, bary) at the texels of a mesh's map [size, size, 3], bled."""
     face, bary = raster.rasterize_uv(mesh, size)
     inside, out = face >= 0, np.zeros((size, size, 3), np.float32)
-    out[inside] = values(
-        raster.interpolate(mesh.vertices, mesh.faces, face[inside], bary[inside]), face[inside], bary[inside]
-    )
+    points = raster.interpolate(mesh.vertices, mesh.faces, face[inside], bary[inside])
+    out[inside] = values(points, face[inside], bary[inside])
     return raster.bleed(out, inside)
 
 
@@ -122,15 +122,12 @@ def test_strips_do_not_show(source, target, monkeypatch):
 
 
 def test_a_surface_that_faces_away_is_no_partner():
-    outer, inner = egg(48, 32), egg(48, 32)
-    inner = inner.moved(inner.vertices * 0.97)
-    shell = Mesh(
-        np.concatenate([outer.vertices, inner.vertices]),
-        np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)]),
-    )
-    points, normals = outer.vertices * 0.98, vertex_normals(outer)
+    outer, inner = egg(48, 32), egg(48, 32).vertices * 0.97
+    faces = np.concatenate([outer.faces, outer.faces[:, ::-1] + len(inner)])
+    shell = Mesh(np.concatenate([outer.vertices, inner]), faces)
     middle = np.abs(outer.uvs[:, 1] - 0.5) < 0.4  # nearer to the inner sheet, which faces the other way
-    face, _ = surfaces.Surface(shell).find_partners(points[middle], normals[middle], 0.02)
+    points, normals = outer.vertices[middle] * 0.98, vertex_normals(outer)[middle]
+    face, _ = surfaces.Surface(shell).find_partners(points, normals, 0.02)
     assert (face >= 0).all() and (face < len(outer.faces)).all()
 
 
@@ -166,8 +163,8 @@ def finished(tmp_path_factory) -> Capture:
     capture = capture_of(tmp_path_factory.mktemp("finished") / "é.wildcap", texture, (-30, 0, 30), light=1.0)
     meshes.write_ply(capture.scan, head())
     for name in stages.MAPS:
-        grey = name in ("specular_albedo.png", "confidence.png")
-        images.write_data(capture.maps / name, np.full((256, 256) if grey else (256, 256, 3), 0.5, np.float32))
+        shape = (256, 256) if name in ("specular_albedo.png", "confidence.png") else (256, 256, 3)
+        images.write_data(capture.maps / name, np.full(shape, 0.5, np.float32))
     images.write_linear(capture.maps / "diffuse_albedo.exr", texture * 1.2)
     return capture
 
@@ -202,23 +199,17 @@ def test_tiles_of_the_artists_mesh_are_baked_and_named(capture, target):
     meshes.write_obj(capture.own_head, target)
     capture.own_head_skin.write_text(json.dumps({"skin_triangles": [[0, len(target.faces)]]}))
     transfer.run(capture, settings_of(scan=False), Reporter("transfer"))
-    names = {path.name for path in capture.delivery.iterdir()}
-    assert names == {"delivery.json", "own_head.obj"} | {
-        f"own_{kind}.{tile}.png"
-        for kind in ("diffuse_albedo", "specular_albedo", "normal", "confidence")
-        for tile in (1001, 1002)
-    }
+    kinds = product(("diffuse_albedo", "specular_albedo", "normal", "confidence"), (1001, 1002))
+    names = {"delivery.json", "own_head.obj", *(f"own_{kind}.{tile}.png" for kind, tile in kinds)}
+    assert {path.name for path in capture.delivery.iterdir()} == names
     assert (capture.delivery / "own_head.obj").read_bytes() == capture.own_head.read_bytes()
     assert images.read_mask(capture.delivery / "own_confidence.1002.png").max() > 0.5
 
 
-def test_nothing_half_done_stays(capture):
+def test_nothing_half_done_stays_and_without_a_scan_there_is_still_a_delivery(capture):
     with pytest.raises(CancelledError):
         transfer.run(capture, settings_of(), Reporter("transfer", cancelled=lambda: True))
     assert not capture.delivery.exists() and not list(capture.root.glob(".delivery*"))
-
-
-def test_without_a_scan_there_is_still_a_delivery(capture):
     meshes.write_points(capture.scan, np.eye(3))  # where no surface was measured
     transfer.run(capture, settings_of(), Reporter("transfer"))
     assert [path.name for path in capture.delivery.iterdir()] == ["delivery.json"]

@@ -5,6 +5,7 @@ is."""
 
 from dataclasses import replace
 from functools import partial
+from itertools import count
 
 import numpy as np
 import OpenImageIO as oiio
@@ -13,7 +14,7 @@ import torch
 
 from core.capture import stages
 from core.capture.capture import Capture
-from core.capture.messages import CancelledError, Problem, Reporter
+from core.capture.messages import CancelledError, Reporter
 from core.face import template
 from core.imaging import images
 from core.settings.settings import from_json
@@ -23,6 +24,7 @@ from core.stages.upscale import gloss
 from core.stages.upscale.enlarge import enlarge, load_network
 from core.stages.upscale.maps import HeadMaps, read_maps
 from tests.fixtures.hairy_head import maps_of
+from tests.fixtures.refused import refused
 
 SMALL, LARGE = 256, 1024
 
@@ -31,6 +33,10 @@ def wave(size: int) -> np.ndarray:
     """A smooth picture in [0.2, 0.8], sampled at texel centres, [size, size]."""
     at = (np.arange(size) + 0.5) / size * 2 * np.pi
     return (0.5 + 0.3 * np.sin(3 * at)[:, None] * np.cos(2 * at)[None]).astype(np.float32)
+
+
+def colours(size: int) -> np.ndarray:
+    return np.stack([wave(size), wave(size) ** 2, wave(size) / 2], 2)
 
 
 def tilted(size: int) -> np.ndarray:
@@ -42,8 +48,7 @@ def tilted(size: int) -> np.ndarray:
 
 @pytest.fixture
 def capture(tmp_path) -> Capture:
-    capture = Capture(tmp_path / "é.wildcap")
-    linear = np.stack([wave(SMALL), wave(SMALL) ** 2, wave(SMALL) / 2], 2)
+    capture, linear = Capture(tmp_path / "é.wildcap"), colours(SMALL)
     images.write_srgb(capture.maps / "diffuse_albedo.png", images.linear_to_srgb(linear), bits=16)
     images.write_linear(capture.maps / "diffuse_albedo.exr", linear)
     images.write_data(capture.maps / "specular_albedo.png", wave(SMALL), bits=16)
@@ -64,7 +69,7 @@ def test_every_map_is_met_at_the_new_size_and_files_keep_their_depth(capture):
     report = run(capture)
     assert {path.name for path in capture.maps_4k.iterdir()} == set(stages.MAPS)
     truth, inner = wave(LARGE), np.s_[16:-16, 16:-16]  # the border has no neighbours to interpolate from
-    linear = np.stack([truth, truth**2, truth / 2], 2)
+    linear = colours(LARGE)
     for name, read, expected, tolerance, kind in (
         ("diffuse_albedo.exr", images.read_linear, linear, 2e-3, "half"),
         ("diffuse_albedo.png", images.read_linear, linear, 2e-3, "uint16"),
@@ -99,19 +104,13 @@ def test_maps_of_the_wanted_size_are_left_as_they_are():
 def test_a_map_of_another_size_is_named(capture, name):
     write = images.write_linear if name.endswith(".exr") else images.write_data
     write(capture.maps / name, np.full((33, 33, 3) if name[0] in "ns" else (33, 33), 0.5))
-    with pytest.raises(Problem, match=f"{name} is 33 x 33"):
-        read_maps(capture.maps, capture.texture_confidence)
+    refused(lambda: read_maps(capture.maps, capture.texture_confidence), f"{name} is 33 x 33")
 
 
 def test_a_cancel_between_maps_leaves_no_folder(capture):
-    left = [2]
-
-    def soon() -> bool:
-        left[0] -= 1
-        return left[0] < 0
-
+    calls = iter([False] * 2)
     with pytest.raises(CancelledError):
-        run(capture, cancelled=soon)
+        run(capture, cancelled=lambda: next(calls, True))
     assert not capture.maps_4k.exists() and not list(capture.root.glob(".*"))
 
 
@@ -159,8 +158,7 @@ def test_an_untrained_network_resamples(capture):
     small = read_maps(capture.maps, capture.texture_confidence)
     large = enlarge(small, lambda share: None, network=network.Rcan(1, 1, 16))
     truth, inner = wave(LARGE), np.s_[16:-16, 16:-16]
-    linear = np.stack([truth, truth**2, truth / 2], 2)
-    assert np.abs(images.srgb_to_linear(large[..., :3]) - linear)[inner].max() < 2e-3
+    assert np.abs(images.srgb_to_linear(large[..., :3]) - colours(LARGE))[inner].max() < 2e-3
     assert np.abs(large[..., 3:6] - tilted(LARGE))[inner].max() < 4e-3
     assert np.abs(large[..., 6] - truth)[inner].max() < 2e-3
 
@@ -190,34 +188,29 @@ def test_the_network_ends_at_any_size(busy, monkeypatch, size):
 
 def test_a_cancel_ends_the_writing_and_leaves_nothing(tmp_path):
     """Between two strips of rows of whatever is being written."""
-    asked = []
+    calls, blank = count(1), np.zeros((4 * images.ROWS_BETWEEN_CHECKS, 8))
 
     def cancelled():
-        asked.append(1)
-        if len(asked) > 2:
+        if next(calls) > 2:
             raise CancelledError("upscale")
 
+    writes = [partial(images.write_data, tmp_path / f"{i}.png", blank, check=cancelled) for i in range(3)]
     with pytest.raises(CancelledError):
-        blank = np.zeros((4 * images.ROWS_BETWEEN_CHECKS, 8))
-        upscale._write_together(
-            [partial(images.write_data, tmp_path / f"{i}.png", blank, check=cancelled) for i in range(3)],
-            lambda done: None,
-        )
-    assert not list(tmp_path.iterdir()) and len(asked) <= 5, "what had not begun did not begin"
+        upscale._write_together(writes, lambda done: None)
+    assert not list(tmp_path.iterdir()) and next(calls) <= 6, "what had not begun did not begin"
 
 
-def test_a_map_of_many_strips_is_whole(tmp_path):
-    for rows in (images.ROWS_BETWEEN_CHECKS - 1, images.ROWS_BETWEEN_CHECKS, 2 * images.ROWS_BETWEEN_CHECKS + 7):
-        truth = np.linspace(0, 1, 3 * rows * 5, dtype=np.float32).reshape(rows, 5, 3)
-        images.write_data(tmp_path / "a.png", truth, bits=16)
-        images.write_data(tmp_path / "a.exr", truth)
-        for name, tolerance in (("a.png", 1e-5), ("a.exr", 1e-3)):
-            assert np.abs(images.read_data(tmp_path / name) - truth).max() < tolerance
+@pytest.mark.parametrize(("strips", "rows"), [(1, -1), (1, 0), (2, 7)])
+def test_a_map_of_many_strips_is_whole(tmp_path, strips, rows):
+    rows += strips * images.ROWS_BETWEEN_CHECKS
+    truth = np.linspace(0, 1, 3 * rows * 5, dtype=np.float32).reshape(rows, 5, 3)
+    for name, options, tolerance in (("a.png", {"bits": 16}, 1e-5), ("a.exr", {}, 1e-3)):
+        images.write_data(tmp_path / name, truth, **options)
+        assert np.abs(images.read_data(tmp_path / name) - truth).max() < tolerance
 
 
 def test_missing_weights_are_told(tmp_path):
-    with pytest.raises(Problem, match="weights are missing"):
-        load_network(tmp_path / "upscaler.safetensors")
+    refused(lambda: load_network(tmp_path / "upscaler.safetensors"), "weights are missing")
 
 
 def test_the_mean_specular_is_that_of_cheeks_and_forehead():

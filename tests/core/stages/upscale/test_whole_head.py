@@ -98,14 +98,13 @@ def test_the_border_of_the_seen_part_is_no_step(cut, done):
     skin; before, by far more."""
     signed = template.mask("face", SIZE)
     soft = grain.blurred(signed[..., None], np.ones_like(signed), 12.0)[..., 0]
-    inner, outer = (soft > 0.60) & (soft < 0.75), (soft > 0.25) & (soft < 0.40)
-    step = [
-        np.abs(np.log(maps.diffuse[inner]).mean(0) - np.log(maps.diffuse[outer]).mean(0)).max() for maps in (cut, done)
-    ]
-    within = np.abs(
-        np.log(done.diffuse[(soft > 0.75) & (soft < 0.9)]).mean(0) - np.log(done.diffuse[inner]).mean(0)
-    ).max()
-    assert step[1] < within + 0.05 and step[1] < 0.5 * step[0]
+    deep, inner, outer = ((soft > low) & (soft < low + 0.15) for low in (0.75, 0.60, 0.25))
+
+    def step(maps: HeadMaps, one, other) -> float:
+        return float(np.abs(np.log(maps.diffuse[one]).mean(0) - np.log(maps.diffuse[other]).mean(0)).max())
+
+    assert step(done, inner, outer) < step(done, deep, inner) + 0.05
+    assert step(done, inner, outer) < 0.5 * step(cut, inner, outer)
 
 
 def test_no_uv_seam_shows(done):
@@ -141,48 +140,43 @@ def test_a_patch_of_scalp_among_unseen_is_no_stain_and_a_scalp_seen_all_around_k
     """Two patches of scalp, of 8 and of 45 mm, seen like the face and half as bright as what is around them."""
     position, scalp = surface().position, template.mask("scalp", SIZE) > 0.9
     crown = position[scalp][position[scalp][:, 2].argmax()]
-    distance = np.linalg.norm(position - crown, axis=2)
-
-    def seen_within(radius_mm: float) -> tuple[HeadMaps, HeadMaps]:
+    distance, given, done = np.linalg.norm(position - crown, axis=2), [], []
+    for radius_mm in (8, 45):
         patch = (distance < radius_mm) & scalp
-        told = replace(
-            cut,
-            confidence=np.where(patch, np.float32(0.7), cut.confidence),
-            seen=np.where(patch, np.float32(1), cut.seen),
-            diffuse=np.where(patch[..., None], 0.5 * cut.diffuse, cut.diffuse),
-        )
-        return told, completed(told)
+        confidence, seen = (np.where(patch, np.float32(x), y) for x, y in ((0.7, cut.confidence), (1, cut.seen)))
+        diffuse = np.where(patch[..., None], 0.5 * cut.diffuse, cut.diffuse)
+        given.append(replace(cut, confidence=confidence, seen=seen, diffuse=diffuse))
+        done.append(completed(given[-1]))
 
     def contrast(maps: HeadMaps) -> float:
         light = np.log(maps.diffuse).mean(2)
         return float(light[(distance < 4) & scalp].mean() - light[(distance > 15) & (distance < 25) & scalp].mean())
 
-    told, done = seen_within(8)
-    assert contrast(told) < -0.5 and abs(contrast(done)) < 0.1
-    told, done = seen_within(45)
-    assert np.array_equal(done.diffuse[(distance < 8) & scalp], told.diffuse[(distance < 8) & scalp])
+    assert contrast(given[0]) < -0.5 and abs(contrast(done[0])) < 0.1
+    inner = (distance < 8) & scalp
+    assert np.array_equal(done[1].diffuse[inner], given[1].diffuse[inner])
 
 
 def test_a_stray_patch_that_was_seen_at_a_glance_goes_and_a_mark_that_was_seen_well_stays(truth, cut):
-    """Two patches of the neck seen half as well as the face, one of them three times as bright as its skin;
-    and a mark on the cheek as dark."""
+    """Two patches of the neck seen half as well as the face, one of them three times as bright as its skin; and a mark
+    on the cheek as dark."""
+
+    def near(at, radius_mm: float) -> np.ndarray:
+        return np.linalg.norm(position - position[tuple(at)], axis=2) < radius_mm
+
     position, texel = surface().position, surface().texel
     below = np.argwhere((template.mask("neck", SIZE) > 0.9) & (texel < 1.5 * np.median(texel)))
-    sides = [
-        tuple(below[np.argsort(position[tuple(below.T)][:, 0])[k]]) for k in (len(below) // 5, 4 * len(below) // 5)
-    ]
-    stray, plain = (np.linalg.norm(position - position[at], axis=2) < 14 for at in sides)
+    below = below[np.argsort(position[tuple(below.T)][:, 0])]
+    sides = below[len(below) // 5], below[4 * len(below) // 5]
+    stray, plain = (near(at, 14) for at in sides)
     well = (template.mask("face", SIZE) > 0.99) & (seen_well(cut.seen, surface()) >= 1)
-    cheek = tuple(np.argwhere(well & (template.mask("skin", SIZE) > 0.99))[5000])
-    mark = (np.linalg.norm(position - position[cheek], axis=2) < 3) & well
-    confidence, seen = (
-        np.where(stray | plain, np.float32(half), each) for half, each in ((0.35, cut.confidence), (0.5, cut.seen))
-    )
+    mark = near(np.argwhere(well & (template.mask("skin", SIZE) > 0.99))[5000], 3) & well
+    halves = ((0.35, cut.confidence), (0.5, cut.seen))
+    confidence, seen = (np.where(stray | plain, np.float32(half), each) for half, each in halves)
     diffuse = np.where((stray | plain)[..., None], truth.diffuse, cut.diffuse)
     diffuse[stray], diffuse[mark] = np.minimum(3 * diffuse[stray], 1), diffuse[mark] / 3
     told = completed(replace(cut, confidence=confidence, seen=seen, diffuse=diffuse.astype(np.float32)))
-    inner = [np.linalg.norm(position - position[at], axis=2) < 4 for at in sides]
-    off = [float(np.abs(np.log(told.diffuse[at] / truth.diffuse[at])).mean()) for at in inner]
+    off = [float(np.abs(np.log(told.diffuse[near(at, 4)] / truth.diffuse[near(at, 4)])).mean()) for at in sides]
     assert off[0] < 0.3 and off[1] < 0.2, off  # the stray one was off by 1.1
     assert np.array_equal(told.diffuse[mark], diffuse[mark].astype(np.float32)) and mark.sum() > 5
 
