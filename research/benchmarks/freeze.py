@@ -13,9 +13,6 @@ repository. What was kept is never replaced: a capture that has changed since is
 Solve a copy of it; research/benchmarks/delighting/state.py measures OUT as it is, with --truths FOLDER.
 """
 
-from __future__ import annotations
-
-import argparse
 import json
 import shutil
 import sys
@@ -26,7 +23,7 @@ from core.capture.files import replacing_folder, write_json
 from core.capture.hashes import read_hash
 from core.capture.messages import Problem
 
-from .figures import ROOT, commit
+from .figures import ROOT, command_line, commit
 
 RECORD = "frozen.json"
 FILES = (
@@ -47,7 +44,7 @@ STAGE_KEYS = ("version", "code", "finished", "seed", "settings")
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("folder", type=Path, nargs="?")
     parser.add_argument("out", type=Path)
     parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")

@@ -9,8 +9,6 @@ tests/test_inventory.py compares the code with the recorded one, so a name chang
 from the sources; Blender is not needed.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import re
@@ -25,7 +23,7 @@ from core.capture import capture_record, stages
 from core.capture.files import write_json
 from core.settings import delivery_presets, settings
 
-from .figures import ROOT
+from .figures import ROOT, command_line
 
 RECORD = ROOT / "tests" / "inventory.json"
 SAVED_NAME = re.compile(r"wildcap_[a-z0-9_]+|WildCap [A-Z][A-Za-z ]*")
@@ -33,7 +31,7 @@ SAVED_NAME = re.compile(r"wildcap_[a-z0-9_]+|WildCap [A-Z][A-Za-z ]*")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = command_line(__doc__)
     parser.add_argument("--out", type=Path, default=RECORD)
     write_json(parser.parse_args().out, take_inventory())
 

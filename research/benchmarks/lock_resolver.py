@@ -7,8 +7,6 @@ pip chooses among versions and wheels. It judges the conditions of a requirement
 it runs in, so it is asked without dependencies, and the conditions are judged here.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import struct

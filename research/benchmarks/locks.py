@@ -13,9 +13,6 @@ alone and say "not verified". PyTorch's build for Linux on the index needs CUDA'
 the lock; where pip finds a build for the CPU as well (in a folder of wheels), the lock has the hashes of both.
 """
 
-from __future__ import annotations
-
-import argparse
 import sys
 from pathlib import Path, PurePosixPath
 
@@ -24,6 +21,7 @@ from core.capture.messages import Problem
 from core.worker import index, locks, pip_steps
 
 from . import lock_resolver
+from .figures import command_line
 from .lock_resolver import Wheel
 
 REQUIREMENTS = Path(__file__).resolve().parents[2] / "requirements"
@@ -166,7 +164,7 @@ def table() -> str:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = command_line(__doc__)
     parser.add_argument("names", metavar="NAME", nargs="*")
     parser.add_argument("--table", action="store_true")
     options = parser.parse_args()

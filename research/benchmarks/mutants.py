@@ -13,9 +13,6 @@ is named by its file, function, kind and position; "code" is the expression it c
 rewritten is searched by hand, and "killed_before" the test that found it at commit e5e14778.
 """
 
-from __future__ import annotations
-
-import argparse
 import ast
 import json
 import os
@@ -29,7 +26,7 @@ from pathlib import Path
 
 from core.capture.files import write_json
 
-from .figures import ROOT
+from .figures import ROOT, command_line
 
 PRODUCT = ("core", "wildcap_addon")
 SWAPS = {
@@ -64,7 +61,7 @@ def _note_hit(number, noted=set()):
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("step", choices=("draw", "trace", "run"))
     parser.add_argument("--record", "--out", type=Path, required=True)
     parser.add_argument("--count", type=int, default=60)

@@ -5,8 +5,6 @@
 A benchmark may write its page when it has run (`write_page`); `python -m research.benchmarks.results` writes all of
 them out of the records, which hold six decimals: a last digit may differ."""
 
-from __future__ import annotations
-
 import datetime
 import inspect
 import re

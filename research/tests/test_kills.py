@@ -33,7 +33,7 @@ from core.solver.lighting import Lights  # noqa: E402
 from core.solver.objective import State  # noqa: E402
 from core.stages.solve import checkpoint  # noqa: E402
 from research.benchmarks.kills import judge, worker  # noqa: E402
-from research.benchmarks.kills.capture import BESIDE, STRANGERS, Undisturbed, capture_at  # noqa: E402
+from research.benchmarks.kills.capture import BESIDE, STRANGERS, Undisturbed, capture_at, copy_place  # noqa: E402
 from tests.fixtures.recorded import make_entry  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,19 +42,8 @@ TRIALS = 5
 
 def test_a_handful_of_kills_loses_nothing_and_ends_in_the_same_bytes():
     seed = time.time_ns() % 10**6
-    command = [
-        sys.executable,
-        "-m",
-        "research.benchmarks.kills",
-        "--count",
-        str(TRIALS),
-        "--seed",
-        str(seed),
-        "--until",
-        "scan",
-        "--delighter",
-        "none",
-    ]
+    words = f"research.benchmarks.kills --count {TRIALS} --seed {seed} --until scan --delighter none".split()
+    command = [sys.executable, "-m", *words]
     ended = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300)
     assert ended.returncode == 0, ended.stdout[-4000:] + ended.stderr[-2000:]
 
@@ -77,7 +66,7 @@ def test_the_judge_is_content_with_what_is_whole_and_finds_every_fault(place):
     root, known = capture_at(place).root, {"frames/00000.jpg": {read_hash(capture_at(place).frames / "00000.jpg")}}
     undisturbed = Undisturbed(place.parent, {}, ("frames",), known=known)
     place.rename(place.parent / "end")
-    undisturbed.copy(place.parent / "end", place)
+    copy_place(place.parent / "end", place)
     assert judge.judge_kill(place, known) == [] and judge.judge_resume(place, undisturbed, "frames") == []
     for name, content, fault in (
         ("frames/00000.jpg", b"a fra", "no complete content"),
@@ -109,17 +98,17 @@ def test_the_judge_finds_what_is_left_after_the_run_that_goes_on(place):
     for name, fault in (
         (".scan.1.tmp.ply", "is left"),
         ("lock.succeeding", "is left"),
-        ("kept/frames/00000.jpg", "nobody had changed it"),
+        ("kept/frames/00000.jpg", "nobody changed it"),
         ("../stray.txt", "lies beside"),
         ("lock", "the lock is not free"),
     ):
-        undisturbed.copy(place.parent / "end", place)
+        copy_place(place.parent / "end", place)
         path = capture_at(place).root / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(b"")
         assert [told for told in judge.judge_resume(place, undisturbed, "frames") if fault in told], name
         shutil.rmtree(place)
-    undisturbed.copy(place.parent / "end", place)
+    copy_place(place.parent / "end", place)
     (capture_at(place).frames / "00000.jpg").write_bytes(b"another")
     assert "frames/00000.jpg is not as in the undisturbed run" in judge.judge_resume(place, undisturbed, "frames")
     assert "the stage cameras is not on record" in judge.judge_resume(place, undisturbed, "cameras")

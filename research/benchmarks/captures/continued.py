@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Captures that go on from another one's, and stages that are run in this very process, one after the other."""
 
-from __future__ import annotations
-
 import importlib
 import shutil
 from pathlib import Path

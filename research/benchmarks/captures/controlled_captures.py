@@ -6,8 +6,6 @@ and the true albedo for frames.
 Each begins from frames, cameras and head of a capture of research/benchmarks/captures/people.py, works in a copy that
 is made once, and leaves an albedo map in the same UVs."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 from functools import cache

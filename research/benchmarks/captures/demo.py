@@ -8,9 +8,6 @@
 Exit code 1 when the result does not beat both the raw video and the flat true tone. What is finished is not done twice.
 """
 
-from __future__ import annotations
-
-import argparse
 import subprocess
 import sys
 import time
@@ -30,10 +27,9 @@ LIGHTS = ("three_point", "sun", "window")
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "demo")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--quality", choices=QUALITIES, default="standard")
-    parser.add_argument("--json", type=Path, help="where the figures go, such as research/records/demo.json")
     arguments = parser.parse_args()
     capture = Capture(arguments.folder.resolve() / "sample.wildcap")
     started = time.monotonic()

@@ -9,9 +9,6 @@ FOLDER/SEED.wildcap has frames, cameras and head; truth/ in it the closed and th
 each; what is there is not made again.
 """
 
-from __future__ import annotations
-
-import argparse
 import os
 from dataclasses import asdict
 from pathlib import Path
@@ -26,6 +23,7 @@ from core.imaging import images
 from ...people import sample, scene
 from ...people.lifelike import filmed, phone
 from ...people.lifelike.figure import make_figure
+from ..figures import command_line
 from .people_lights import KINDS
 from .shadow_captures import registered, write_views
 
@@ -45,7 +43,7 @@ WHITE, TO = 97, 0.8
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", type=int, nargs="+", choices=list(EYES), default=list(EYES))
     parser.add_argument("--facekit", type=Path, help="ICT-FaceKit's folder: without it they are other heads")

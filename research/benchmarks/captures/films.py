@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The frames of a film that a benchmark reads from its first to its last."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

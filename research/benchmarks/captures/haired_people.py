@@ -3,8 +3,6 @@
 """Photographs of people whose every hair is known: frames through a phone's pipeline, and the maps that their true
 albedo gives."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -8,8 +8,6 @@ one frame's time, and only the latter smears a picture. Cameras and normals are 
 sways; cameras.json has the head's poses too.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Iterator

@@ -19,15 +19,13 @@ not made again. With --facekit (ICT-FaceKit's folder) the heads' shape is derive
 heads of the same people.
 """
 
-from __future__ import annotations
-
-import argparse
 import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from ...people.lifelike.figure import make_figure
+from ..figures import command_line
 from ..pictures.likeness_sheet import write_sheet
 from . import people
 from .likeness_captures import film_person
@@ -66,7 +64,7 @@ OTHERWISE = "hazy sun"
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     everybody = [person.name for person in (*LIKENESSES, *people.PEOPLE)]
     parser.add_argument("folder", type=Path)
     parser.add_argument(

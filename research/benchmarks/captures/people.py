@@ -14,9 +14,6 @@ the true skin tone. Two more captures of each, NAME_flash and NAME_studio: in a 
 by sixteen fixed cameras in even light. Those are made only, not solved (research/benchmarks/light/controlled.py does).
 What is there is not made again."""
 
-from __future__ import annotations
-
-import argparse
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -39,6 +36,7 @@ from ...people import sample, scene
 from ...people.identities import subject_mesh
 from ...people.parameters import sample_parameters
 from ...people.skin import Skin, make_skin
+from ..figures import command_line
 from .people_lights import FURTHER, KINDS
 from .shadow_captures import registered, write_views
 
@@ -74,7 +72,7 @@ BLUR_PX, NOISE = 0.6, 0.006  # deviations; of the noise in sRGB at mid grey
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
     parser.add_argument("--places", nargs="+", choices=PLACES, default=PLACES[:1])

@@ -7,8 +7,6 @@ World: metres, +Z up, the head's middle at the origin, its face towards -Y. Radi
 exposure.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from core.geometry.meshes import Mesh

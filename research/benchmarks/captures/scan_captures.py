@@ -9,9 +9,6 @@ layout that research/benchmarks/maps/albedo_score.py says, FOLDER/scan_NAME.wild
 cameras, so that the chain begins at scan. The scan's own map stands for the albedo, though it holds light itself: what
 differs between the five is the measure, not the distance to it. What is there is not made again."""
 
-from __future__ import annotations
-
-import argparse
 import json
 import os
 import time
@@ -32,6 +29,7 @@ from core.settings.settings import Settings
 
 from ...people import sample, scene
 from ...people.lifelike import filmed, phone
+from ..figures import command_line
 from .people import TRUTHS, exposure
 from .people_lights import FURTHER, KINDS
 from .shadow_captures import write_views
@@ -58,7 +56,7 @@ NEEDED = (
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("data", type=Path)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--lights", nargs="+", choices=LIGHTS, default=list(LIGHTS))

@@ -7,8 +7,6 @@ The light of research/people/light.py is baked into a subject's UVs and photogra
 JPEG; the registered head is the true one, off by half a millimetre here and there, as a fit leaves it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

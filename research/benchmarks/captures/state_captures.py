@@ -7,8 +7,6 @@ A folder holds NAME.wildcap and beside it, or in another folder, NAME/ with the 
 (research/benchmarks/maps/albedo_score.py says its layout; head.obj, the true head, tells which captures show the same
 person; maps/part_NAME.png are masks in the head's UVs, where there are any)."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import dataclass
 from functools import cached_property

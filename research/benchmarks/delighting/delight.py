@@ -21,8 +21,6 @@ over the pictures:
 --picture shows six photographs of one set, the truth and the rows; only of synthetic people in the documentation.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import json
@@ -58,11 +56,7 @@ QUICK = 4  # every n-th picture
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        prog="python -m research.benchmarks.delighting.delight",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = figures.command_line(__doc__, "delight")
     parser.add_argument(
         "--data", type=Path, default=SHARED / "faceolat", help="photographs with their albedo, laid out like faceolat"
     )
@@ -87,7 +81,6 @@ def main() -> None:
     )
     parser.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
     parser.add_argument("--quick", action="store_true", help=f"every {QUICK}th picture, without the feature distance")
-    parser.add_argument("--json", type=Path, help="where the results go; what it holds of other sets and rows stays")
     parser.add_argument("--picture", type=Path, help="six photographs of the set, truth and rows side by side")
     options = parser.parse_args()
     if options.picture and len(options.sets) != 1:
@@ -117,10 +110,9 @@ def main() -> None:
             except Problem as problem:
                 found = {"-": {"not_run": f"{problem.problem} {problem.remedy}"}}
         results[title] = {**results.get(title, {}), **found}
-        if options.json:
-            figures.write_record(
-                options.json, "delight", "python -m research.benchmarks.delighting.delight [--data DIR]", results
-            )
+        figures.write_record(
+            options.json, "delight", "python -m research.benchmarks.delighting.delight [--data DIR]", results
+        )
     print(table(results))
     if any(
         row.startswith("network") and "figures" in found for rows_ in results.values() for row, found in rows_.items()

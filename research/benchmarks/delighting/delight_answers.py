@@ -12,8 +12,6 @@ FOLDER holds captures with a truth, as research/benchmarks/state.py reads them; 
 whatever code gave them: delete it to ask anew. An error is the deviation, in natural log, of the picture less an answer
 from the true albedo, over bare facial skin in all frames, after one gain per channel and capture."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Callable
@@ -81,14 +79,13 @@ class Judged:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "delight_answers")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--truths", type=Path, help="where NAME/ with the truth lies, if not in FOLDER")
     parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
     parser.add_argument("--sample", type=Path, help="the sample's capture")
     parser.add_argument("--eyes", type=Path, help="what research/benchmarks/eye_captures.py made")
     parser.add_argument("--facekit", type=Path, help="of --eyes, as it was given there")
-    parser.add_argument("--json", type=Path, help="where the figures go")
     asked = parser.parse_args()
     work = asked.folder.resolve() / "answers"
     judged, known = {}, known_captures(asked)
@@ -107,10 +104,9 @@ def main() -> int:
         print(f"{name}: read", file=sys.stderr, flush=True)
     rows, chosen = score(judged)
     print(table(rows), "", choices(chosen), sep="\n")
-    if asked.json:
-        figures.write_record(
-            asked.json, "delight_answers", COMMAND, {"rows": rows, "chosen": chosen, "over_people": over_people(rows)}
-        )
+    figures.write_record(
+        asked.json, "delight_answers", COMMAND, {"rows": rows, "chosen": chosen, "over_people": over_people(rows)}
+    )
     return 0
 
 

@@ -6,8 +6,6 @@ many.
 All figures are those of research/benchmarks/measures/pictures.py after one gain per channel in linear light, so that
 neither the tone nor the light's colour counts."""
 
-from __future__ import annotations
-
 import math
 
 import cv2

@@ -3,8 +3,6 @@
 """Synthetic portraits with their truth for research/benchmarks/delighting/delight.py: subjects of all skin tones that
 no training sees, each under several lights."""
 
-from __future__ import annotations
-
 import sys
 from functools import cache, lru_cache
 from pathlib import Path

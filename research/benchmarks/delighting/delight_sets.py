@@ -3,8 +3,6 @@
 """What research/benchmarks/delighting/delight.py measures on: photographs with a known albedo, single ones and those of
 a registered capture."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from dataclasses import dataclass, replace

@@ -7,8 +7,6 @@ The second pigment is the first times blotches of several sizes, from a mole's t
 pigment from light may not be that it knows faces. Subjects are those of
 research/benchmarks/delighting/delight_portraits.py, which no training sees."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

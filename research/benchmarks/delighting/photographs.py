@@ -12,9 +12,6 @@ man with brows and a beard under seven lamps, ambient light subtracted; the merg
 the truth), pairs (research/benchmarks/delighting/pairs.py, --subjects of each group of skin tone). Rows: the four
 references of research/benchmarks/measures/references.py, and the delighter."""
 
-from __future__ import annotations
-
-import argparse
 import importlib
 import json
 import sys
@@ -96,7 +93,7 @@ class LightSeries:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "photographs")
     parser.add_argument("--data", type=Path, default=SHARED)
     parser.add_argument(
         "--delighter", choices=[name for name in delight.PHOTOGRAPHERS if name != "none"], default="network"
@@ -108,7 +105,6 @@ def main() -> int:
     )
     parser.add_argument("--sets", nargs="+", choices=TITLES, default=list(TITLES))
     parser.add_argument("--subjects", type=int, default=2, help="of each group of skin tone")
-    parser.add_argument("--json", type=Path, help="where the record goes, research/records/photographs.json")
     options = parser.parse_args()
     if options.weights:
         importlib.import_module("core.stages.delight.network").WEIGHTS = options.weights
@@ -127,8 +123,7 @@ def main() -> int:
         text.append((TITLES[name], format_table(found, COLUMNS, "answer")))
         record[name] = to_record(found, scores)
     print("\n\n".join(f"{heading}\n\n{body}" for heading, body in text))
-    if options.json:
-        figures.write_record(options.json, "photographs", COMMAND, record, keep=True)
+    figures.write_record(options.json, "photographs", COMMAND, record, keep=True)
     return 0
 
 

@@ -11,9 +11,6 @@ photographed before a light ground; they are also cut out over white and over bl
 checkout of it, with its estimate_from_frames in the place of estimate_skin_tone.
 """
 
-from __future__ import annotations
-
-import argparse
 import subprocess
 import sys
 from collections.abc import Callable
@@ -31,7 +28,7 @@ from core.stages.solve.capture_evidence import read_evidence
 from core.stages.solve.population import to_lab
 from core.stages.solve.tone import TONE_SIDE_TEXELS, estimate_skin_tone
 
-from ..figures import ROOT, write_record
+from ..figures import ROOT, command_line, write_record
 
 SAMPLE = ROOT / "research" / "people" / "sample"
 LONDON = {
@@ -54,12 +51,11 @@ LISA = ("45cm", "60cm", "lisa1", "lisa3")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = command_line(__doc__, "real_tones")
     parser.add_argument("data", type=Path)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", help="cases whose names begin with one of these")
     parser.add_argument("--row", default="after")
-    parser.add_argument("--json", type=Path, help="where the figures go, such as research/records/real_tones.json")
     options = parser.parse_args()
     figures = {}
     for name, prepare in cases(options.data).items():
@@ -87,14 +83,13 @@ def main() -> None:
             )
         figures[name] = {options.row: estimate(capture)}
         print(name, *figures[name][options.row].values(), flush=True)
-    if options.json:
-        write_record(
-            options.json,
-            "real_tones",
-            "python -m research.benchmarks.delighting.real_tones DATA FOLDER",
-            figures,
-            keep=True,
-        )
+    write_record(
+        options.json,
+        "real_tones",
+        "python -m research.benchmarks.delighting.real_tones DATA FOLDER",
+        figures,
+        keep=True,
+    )
 
 
 def cases(data: Path) -> dict[str, Callable[[Path], Path]]:

@@ -11,9 +11,6 @@ Printed per mask: intersection over union, precision and recall over the facial 
 border at 3 texels of a 1024 map, and the processor's seconds that the stage shadow_mask took.
 """
 
-from __future__ import annotations
-
-import argparse
 import shutil
 import tempfile
 import time
@@ -29,7 +26,7 @@ from core.settings.settings import from_json
 
 from ..captures.continued import begin_at_delight, run_stages
 from ..captures.shadow_captures import KINDS, SIZE, lifted_truth, synthetic_capture
-from ..figures import write_record
+from ..figures import command_line, write_record
 
 HELD_OUT = (200, 201, 202, 203, 204, 205)
 NEAR = 3.0  # texels of a 1024 map
@@ -37,20 +34,11 @@ COLUMNS = ("true", "masked", "IoU", "precision", "recall", "border F", "CPU seco
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        prog="python -m research.benchmarks.delighting.shadow_mask",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = command_line(__doc__, "shadow_mask")
     parser.add_argument("--seeds", type=int, nargs="*", default=HELD_OUT)
     parser.add_argument("--capture", type=Path, nargs=2, action="append", default=[], metavar=("CAPTURE", "TRUTH"))
     parser.add_argument("--delighters", nargs="+", default=["shading", "none"])
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_shadow_masks")
-    parser.add_argument(
-        "--json",
-        type=Path,
-        help="where the figures go, such as research/records/shadow_mask.json; those of other rows stay",
-    )
     options = parser.parse_args()
     found: dict[str, dict] = {}
     print("| capture | delighter | " + " | ".join(COLUMNS) + " |\n| --- | --- |" + " --- |" * len(COLUMNS))
@@ -67,14 +55,9 @@ def main() -> None:
         delighter = _delighter_of(Capture(capture))
         row = _row(*_filmed(capture, truth, options.work), capture.stem, delighter)
         found[f"{capture.stem}, {delighter}"] = _figures(capture.stem, delighter, row)
-    if options.json:
-        write_record(
-            options.json,
-            "shadow_mask",
-            "python -m research.benchmarks.delighting.shadow_mask",
-            {"rows": found},
-            keep=True,
-        )
+    write_record(
+        options.json, "shadow_mask", "python -m research.benchmarks.delighting.shadow_mask", {"rows": found}, keep=True
+    )
 
 
 def scores(proposed: np.ndarray, true: np.ndarray, judged: np.ndarray) -> tuple[float, ...]:

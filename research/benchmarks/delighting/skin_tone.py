@@ -11,9 +11,6 @@ root mean square error of L*, mean delta E 2000, the stated deviation of L*, and
 those. A capture is a finished one with the sRGB of its true tone in a text file.
 """
 
-from __future__ import annotations
-
-import argparse
 from pathlib import Path
 
 import numpy as np
@@ -34,20 +31,15 @@ from ...people.pigment import reflectance
 from ...people.sample import RESERVED
 from ...training.seeds import HELD_OUT_SEED
 from ...training.tones import PHONES, photographed, scenes_of
-from ..figures import write_record
+from ..figures import command_line, write_record
 
 MOST = 400  # subjects looked at until each group has enough
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = command_line(__doc__, "skin_tone")
     parser.add_argument("--each", type=int, default=6, help="subjects of each group, at least")
     parser.add_argument("--capture", nargs=2, action="append", default=[], metavar=("CAPTURE", "TONE"))
-    parser.add_argument(
-        "--json",
-        type=Path,
-        help="where the figures go, such as research/records/skin_tone.json; those of other captures stay",
-    )
     options = parser.parse_args()
     rows: dict[str, list] = {"scene": [], "measured": []}
     subjects = dict.fromkeys((name for _, name in TYPOLOGY_GROUPS), 0)
@@ -72,14 +64,13 @@ def main() -> None:
     for folder, truth in options.capture:
         tone = np.array([float(v) for v in Path(truth).read_text(encoding="ascii").split("#")[0].split(",")])
         captures[Path(folder).stem] = of_capture(Capture(folder), tone)
-    if options.json:
-        write_record(
-            options.json,
-            "skin_tone",
-            "python -m research.benchmarks.delighting.skin_tone --each 14 [--capture CAPTURE TONE.txt]",
-            {"groups": summary(rows, subjects), "captures": captures},
-            keep=True,
-        )
+    write_record(
+        options.json,
+        "skin_tone",
+        "python -m research.benchmarks.delighting.skin_tone --each 14 [--capture CAPTURE TONE.txt]",
+        {"groups": summary(rows, subjects), "captures": captures},
+        keep=True,
+    )
 
 
 def expected(seed: int) -> str:

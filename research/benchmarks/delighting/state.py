@@ -15,9 +15,6 @@ stopped. People whose figures --json's record holds already, by the same code, s
 be made person by person.
 """
 
-from __future__ import annotations
-
-import argparse
 import ast
 import json
 import sys
@@ -115,14 +112,13 @@ INTRODUCTION = (
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "state")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
     parser.add_argument(
         "--run", action="store_true", help="run the chain, to the solve, on captures where it is not fresh"
     )
     parser.add_argument("--page", type=Path, help="where the page goes, docs/results/state.md")
-    parser.add_argument("--json", type=Path, help="where the record goes, research/records/state.json")
     options = parser.parse_args()
     folder = options.folder.resolve()
     if options.run and (folder / freeze.RECORD).is_file():

@@ -3,8 +3,6 @@
 """All measures of one capture, and of the captures of one person together, for
 research/benchmarks/delighting/state.py."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

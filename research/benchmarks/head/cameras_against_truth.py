@@ -8,8 +8,6 @@ film of a head that sways has the cameras with respect to the head there: what c
 lie from where they were filmed, face_off_px, after the similarity that makes them lie best in all frames.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

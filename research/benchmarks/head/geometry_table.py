@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What research.benchmarks.head.geometry found, as Markdown."""
 
-from __future__ import annotations
-
 from ..figures import markdown, number
 
 ROWS = {

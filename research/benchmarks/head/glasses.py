@@ -9,9 +9,6 @@ DATA: the folder with photographs/, portraits/, faceolat/, near_ps_human1/, bust
 each of them is a capture, or several. FOLDER holds the figures' sights as `research.training glasses` keeps them.
 """
 
-from __future__ import annotations
-
-import argparse
 import json
 import tempfile
 from collections.abc import Iterator
@@ -116,11 +113,10 @@ def filmed(video: Path) -> list[np.ndarray]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "glasses")
     parser.add_argument("data", type=Path, nargs="?", default=SHARED)
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_glasses")
     parser.add_argument("--hdri", type=Path)
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     record = {
         "real": {
@@ -130,8 +126,7 @@ def main() -> None:
     }
     record["rendered"] = rendered(options.work, options.hdri)
     print(json.dumps(record, indent=1))
-    if options.json:
-        figures.write_record(options.json, "glasses", COMMAND, record)
+    figures.write_record(options.json, "glasses", COMMAND, record)
 
 
 if __name__ == "__main__":

@@ -16,9 +16,6 @@ no single hairs, no growth can know more. Parser: texels to which it gives more 
 grows. Direction: each true hair against the nearest grown one within 3 mm, from root to tip, on the skin; beside it
 what the usual directions alone give. FOLDER keeps the pictures."""
 
-from __future__ import annotations
-
-import argparse
 from pathlib import Path
 
 import cv2
@@ -87,7 +84,7 @@ USUAL_ALONE = 1e6
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "groomed")
     parser.add_argument("folder", metavar="FOLDER", type=Path)
     parser.add_argument(
         "--seeds",
@@ -100,7 +97,6 @@ def main() -> None:
         "--trust", action="store_true", help="how far hair is off for how clear strokes must be (seeds 3, 5, 13)"
     )
     parser.add_argument("--sheet", type=Path, help="a picture of true and grown hair")
-    parser.add_argument("--json", type=Path, help="where the figures go, such as research/records/groomed.json")
     options = parser.parse_args()
     if options.trust:
         print(
@@ -117,8 +113,7 @@ def main() -> None:
         print(to_table(rows).splitlines()[-1], flush=True)
     if options.sheet:
         images.write_srgb(options.sheet, np.concatenate(pictures))
-    if options.json:
-        figures.write_record(options.json, "groomed", COMMAND, {"people": rows})
+    figures.write_record(options.json, "groomed", COMMAND, {"people": rows})
 
 
 def to_table(rows: dict[str, dict]) -> str:

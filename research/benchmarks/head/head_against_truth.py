@@ -10,9 +10,6 @@ OBJ or PLY in that world, or a glTF in it turned Y up: (x, -z, y) of it is the w
 truth is the sample's subject.
 """
 
-from __future__ import annotations
-
-import argparse
 import json
 from pathlib import Path
 
@@ -29,6 +26,7 @@ from core.stages.registration.alignment import Similarity, similarity
 
 from ...people.identities import subject_mesh
 from ...people.sample import RESERVED
+from ..figures import command_line
 
 
 def compare_surface(capture: Capture, truth: Path, mesh: Path | None, surface: str = "head.obj") -> dict:
@@ -135,7 +133,7 @@ def _round(figure: float) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("capture", type=Path)
     parser.add_argument("truth", type=Path)
     parser.add_argument("mesh", type=Path, nargs="?")

@@ -8,10 +8,6 @@ Synthetic heads of known size, photographed by known cameras; printed is by how 
 far it leans, which is what PUPILS_PER_LIDS in core/stages/cameras/landmarks.py was set by (its 1.019 divides out; the
 heads it was set on are the default seeds)."""
 
-from __future__ import annotations
-
-import argparse
-
 import numpy as np
 
 from core.face import faces
@@ -20,6 +16,7 @@ from core.stages.cameras.world import intersect_rays
 
 from ...people import painted_head
 from ...people.identities import identity_coefficients
+from ..figures import command_line
 
 SEEDS = (5, 11, 23, 31, 42, 57)
 AZIMUTHS = (-40, -28, -18, -9, 0, 9, 18, 28, 40)
@@ -45,7 +42,7 @@ def measure(seed: int) -> tuple[float, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("seeds", type=int, nargs="*", default=SEEDS)
     errors = []
     for seed in parser.parse_args().seeds:

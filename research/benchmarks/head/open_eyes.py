@@ -13,9 +13,6 @@ eyes that these heads have by themselves. Distances in mm: from the fitted edges
 largest of an eye's two; between the centres of the eyeballs. The iris' true colour is the median of the eye's picture
 between pupil and rim; delta E is CIE 2000."""
 
-from __future__ import annotations
-
-import argparse
 import json
 import sys
 from pathlib import Path
@@ -39,7 +36,7 @@ from ...people.lifelike.figure import paint
 from ...people.lifelike.person import sample_person
 from ..captures.eye_captures import EYES
 from ..captures.likenesses import HELD_BACK, LIKENESSES
-from ..figures import markdown, write_record
+from ..figures import command_line, markdown, write_record
 from .cameras_against_truth import place_truth
 
 COLUMNS = (
@@ -59,7 +56,7 @@ QUIET = Reporter("registration", emit=lambda message: None)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__, "open_eyes")
     parser.add_argument("folder", type=Path)
     parser.add_argument(
         "--only",
@@ -68,7 +65,6 @@ def main() -> None:
         default=[person.name for person in LIKENESSES],
     )
     parser.add_argument("--eyes", type=Path, help="captures of research/benchmarks/captures/eye_captures.py")
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     rows = fit_alone(options.eyes.resolve()) if options.eyes else {}
     for name in options.only:
@@ -87,14 +83,13 @@ def main() -> None:
             ],
         )
     )
-    if options.json:
-        write_record(
-            options.json,
-            "open_eyes",
-            "python -m research.benchmarks.head.open_eyes FOLDER --eyes FOLDER",
-            {"rows": rows},
-            keep=True,
-        )
+    write_record(
+        options.json,
+        "open_eyes",
+        "python -m research.benchmarks.head.open_eyes FOLDER --eyes FOLDER",
+        {"rows": rows},
+        keep=True,
+    )
 
 
 def compare(capture: Capture, truth: Path) -> list[dict]:

@@ -17,9 +17,6 @@ network what always says where parts usually are: the mean of the other people's
 head that is taken for skin; skin_as_hair: the reverse. The sheet of photographs is for looking only.
 """
 
-from __future__ import annotations
-
-import argparse
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -37,7 +34,7 @@ from ...people.lifelike.figure import make_figure
 from ...people.lifelike.truth import Scene
 from ..captures.films import read_film
 from ..captures.likenesses import LIKENESSES
-from ..figures import markdown, write_record
+from ..figures import command_line, markdown, write_record
 
 VIEWS, SIZE, TEXELS = 8, 400, 1024
 SPARSE = 4.0
@@ -63,8 +60,7 @@ COLOURS = (
 
 
 def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--json", type=Path)
+    options = command_line(__doc__, "parts")
     options.add_argument(
         "--frames", type=Path, metavar="FOLDER", help="what research.benchmarks.captures.likenesses wrote"
     )
@@ -90,14 +86,13 @@ def main() -> None:
         shares = (*r["iou"].values(), r["hair_as_skin"], r["skin_as_hair"])
         lines.append([name, f"{r['found']} of {r['pictures']}", *(None if v is None else f"{v:.2f}" for v in shares)])
     print(markdown(["person", "found", *PARTS, "hair as skin", "skin as hair"], lines))
-    if options.json:
-        write_record(
-            options.json,
-            "parts",
-            "python -m research.benchmarks.head.parts" + (" --frames FOLDER" if options.frames else ""),
-            {"rows": rows},
-            keep=True,
-        )
+    write_record(
+        options.json,
+        "parts",
+        "python -m research.benchmarks.head.parts" + (" --frames FOLDER" if options.frames else ""),
+        {"rows": rows},
+        keep=True,
+    )
 
 
 def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:

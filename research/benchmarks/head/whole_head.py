@@ -18,9 +18,6 @@ tone, the errors as above where nobody looked; cut, the step over the map's own 
 cm^2.
 """
 
-from __future__ import annotations
-
-import argparse
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -44,7 +41,7 @@ from core.stages.upscale.whole_head import UNSEEN_CONFIDENCE, complete
 
 from ...people.parameters import sample_parameters
 from ...people.skin import make_skin
-from ..figures import write_record
+from ..figures import command_line, write_record
 
 SEEDS = [9101, 9102, 9103, 9104, 9105, 9106]
 RINGS = (8.0, 11.0), (-6.0, -3.0), (22.0, 25.0)
@@ -52,18 +49,11 @@ RINGS = (8.0, 11.0), (-6.0, -3.0), (22.0, 25.0)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        prog="python -m research.benchmarks.head.whole_head", description=__doc__.splitlines()[0]
-    )
+    parser = command_line(__doc__, "whole_head")
     parser.add_argument("captures", nargs="*", type=Path)
     parser.add_argument("--seeds", nargs="*", type=int, default=SEEDS)
     parser.add_argument("--subject", type=int)
     parser.add_argument("--size", type=int, default=512)
-    parser.add_argument(
-        "--json",
-        type=Path,
-        help="where the figures go, such as research/records/whole_head.json; those of other captures stay",
-    )
     options = parser.parse_args()
     found = {}
     if options.seeds:
@@ -73,14 +63,13 @@ def main() -> None:
     for path in options.captures:
         found[path.stem] = of_capture(Capture(path), options.subject)
     print(json.dumps(found, indent=1))
-    if options.json:
-        write_record(
-            options.json,
-            "whole_head",
-            "python -m research.benchmarks.head.whole_head [--subject SEED] [CAPTURE]",
-            found,
-            keep=True,
-        )
+    write_record(
+        options.json,
+        "whole_head",
+        "python -m research.benchmarks.head.whole_head [--subject SEED] [CAPTURE]",
+        found,
+        keep=True,
+    )
 
 
 def whole(seed: int, surface: HeadSurface) -> dict:

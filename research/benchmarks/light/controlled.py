@@ -20,9 +20,6 @@ FOLDER/controlled keeps maps and figures, so that a second run goes on where the
 made is left out; what OUT.json has and FOLDER has not stays in it.
 """
 
-from __future__ import annotations
-
-import argparse
 import json
 import sys
 from collections.abc import Callable
@@ -63,10 +60,9 @@ COLUMNS = {
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "controlled")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     folder = options.folder.resolve()
     if not folder.is_dir():
@@ -82,8 +78,7 @@ def main() -> int:
     everyone = figures.merged(known, found)
     people = {p.name: everyone[p.name] for p in PEOPLE if p.name in everyone}
     summary = {"people": people, "mean": means(people)}
-    if options.json:
-        figures.write_record(options.json, "controlled", COMMAND, summary)
+    figures.write_record(options.json, "controlled", COMMAND, summary)
     print(table(summary))
     return 0
 

@@ -9,9 +9,6 @@ Rendered in Blender's Python module with the node group WildCap Skin as it comes
 and the albedo as the Base Color. 1 is all of it: what a capture measured as albedo is what a renderer then shows.
 """
 
-from __future__ import annotations
-
-import argparse
 import sys
 import tempfile
 from pathlib import Path
@@ -44,8 +41,7 @@ SIDE, SAMPLES = 32, 256
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, metavar="OUT.json")
+    parser = figures.command_line(__doc__, "even_light")
     arguments = parser.parse_args()
     with extension():
         found = {
@@ -55,13 +51,9 @@ def main() -> int:
             }
             for way in WAYS
         }
-    if arguments.json:
-        figures.write_record(
-            arguments.json,
-            "even_light",
-            f"python -m research.benchmarks.light.even_light --json {arguments.json}",
-            found,
-        )
+    figures.write_record(
+        arguments.json, "even_light", f"python -m research.benchmarks.light.even_light --json {arguments.json}", found
+    )
     print(table(found))
     return 0
 

@@ -9,8 +9,6 @@ brightness changes tells the highlight from the albedo: a strength per place and
 squares. Bounces between nose and cheek are not known light and stay.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -21,8 +21,6 @@ The true maps are worn where the registered surface lies on the true head (resea
 albedos share the truth's mean over confident facial skin. WORK keeps the renders; those that are newer than the maps
 and textures are taken as they are."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import subprocess
@@ -81,7 +79,7 @@ OVER_RAW, OVER_DELIT = 1.0, 0.5  # dB that are asked for
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "relit")
     parser.add_argument("work", type=Path)
     parser.add_argument("--sample", type=Path)
     parser.add_argument("--people", type=Path)
@@ -89,7 +87,6 @@ def main() -> int:
     parser.add_argument(
         "--picture", type=Path, help="a JPEG of the first subject under all lights: truth, solved, delit, raw"
     )
-    parser.add_argument("--json", type=Path, help="where the table's figures go, such as research/records/relit.json")
     parser.add_argument("--lights", nargs="+", default=LIGHTS)
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS)
     arguments = parser.parse_args()

@@ -8,8 +8,6 @@ true head, not where their UVs agree: these are a millimetre apart, by which all
 All albedos have the same mean over confident facial skin, the truth's: what the rows differ in is not brightness.
 """
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path

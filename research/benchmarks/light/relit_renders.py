@@ -9,8 +9,6 @@ pixel and the folder for CAPTURE_LIGHT.exr; pictures that exist stay. One more, 
 masks: red where the face is, green where there is head. Only the rectangle about the face is rendered; the rest stays
 black."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys

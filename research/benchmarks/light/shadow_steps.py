@@ -11,11 +11,7 @@ truth, texture over true albedo. The last one's deviation is what core/solver/ex
 stand that of all other people, the share of the steps that the solver takes for light by these, and the best share, the
 slope of the true steps on those that it sees."""
 
-from __future__ import annotations
-
-import argparse
 import sys
-from pathlib import Path
 
 import numpy as np
 
@@ -41,9 +37,8 @@ HEAD = ["capture", "taken out", "seen", "left in truth", "LEFT of other people",
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "shadow_steps")
     add_captures(parser)
-    parser.add_argument("--json", type=Path, help="where the figures go")
     asked = parser.parse_args()
     rows = {}
     for filmed in captures_asked(parser, asked):
@@ -54,8 +49,7 @@ def main() -> int:
         row["left_of_others"] = float(np.sqrt(np.mean(np.square(others)))) if others else None
         row["taken"] = min(1.0, (row["left_of_others"] / row["seen_spread"]) ** 2) if others else None
     print(table(rows))
-    if asked.json:
-        figures.write_record(asked.json, "shadow_steps", COMMAND, {"rows": rows})
+    figures.write_record(asked.json, "shadow_steps", COMMAND, {"rows": rows})
     return 0
 
 

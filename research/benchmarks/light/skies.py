@@ -8,9 +8,6 @@ FOLDER holds panoramas (.hdr, .exr), +Z up. Their sun or lamp is taken out as fo
 its own. Every panorama counts as if it were turned about the vertical by any angle.
 """
 
-from __future__ import annotations
-
-import argparse
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +20,7 @@ from core.solver.extensions.split import TRAIT_REACH_M
 from core.stages.delight.surface import skin_weights
 
 from ...people.environments import panorama_directions, read_panoramas, solid_angles, without_lamp
+from ..figures import command_line
 
 POINTS = 2500  # of the skin, drawn evenly
 PAIRS = ((1, 3), (4, 8), (5, 7))
@@ -30,7 +28,7 @@ PAIRS = ((1, 3), (4, 8), (5, 7))
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("folder", type=Path)
     panoramas = read_panoramas(parser.parse_args().folder)
     if not panoramas:

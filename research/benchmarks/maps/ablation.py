@@ -16,8 +16,6 @@ so the command goes on where it was stopped. --skins names a folder of skins car
 research.training carry`); those in the prior's card under held_out_skins are added to the subjects. The picture is of
 synthetic subjects only."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import math
@@ -98,7 +96,7 @@ TONES = (
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "ablation")
     parser.add_argument("out", type=Path)
     parser.add_argument("--rows", nargs="+", choices=tuple(ROWS), default=list(ROWS))
     parser.add_argument("--subjects", nargs="+", default=list(SUBJECTS))
@@ -108,9 +106,6 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=20, help="of every row that does not say otherwise")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--table", action="store_true", help="solve nothing, print what is there")
-    parser.add_argument(
-        "--json", type=Path, help="where the table's figures go, such as research/records/ablation.json"
-    )
     parser.add_argument("--picture", type=Path, help="draw two subjects instead")
     options = parser.parse_args()
     done = json.loads(options.out.read_text(encoding="utf-8")) if options.out.is_file() else {}
@@ -129,8 +124,7 @@ def main() -> None:
             "sampling alone:",
             found["tone"],
         )
-    if options.json:
-        figures.write_record(options.json, "ablation", "python -m research.benchmarks.maps.ablation OUT.json", found)
+    figures.write_record(options.json, "ablation", "python -m research.benchmarks.maps.ablation OUT.json", found)
 
 
 def solve_all(options: argparse.Namespace, done: dict) -> None:
@@ -231,11 +225,7 @@ def solve_problem(
 
 
 def fit_texels(
-    start: Start,
-    recipe: Recipe,
-    updates: int = 600,
-    fit: Callable[..., None] = update_lights,
-    smooth: float = 0.0,
+    start: Start, recipe: Recipe, updates: int = 600, fit: Callable[..., None] = update_lights, smooth: float = 0.0
 ) -> State:
     """No prior: the albedo's texels and the lights follow the photometric loss alone, under Adam (the paper's
     ablation).

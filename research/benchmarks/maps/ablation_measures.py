@@ -3,8 +3,6 @@
 """What the ablation measures of a solved albedo, region by region, and the table it makes of many
 (research/benchmarks/maps/ablation.py)."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -12,9 +12,6 @@ numbered by video frame. Figures per capture, each the mean over the frames with
   face_coverage      share of the face masks that the solved head covers
 """
 
-from __future__ import annotations
-
-import argparse
 import json
 import math
 from dataclasses import dataclass
@@ -31,7 +28,7 @@ from core.geometry.views import read_views
 from core.imaging import images
 
 from ..captures.films import read_film
-from ..figures import markdown, write_record
+from ..figures import command_line, markdown, write_record
 from ..measures.pictures import detail, differences, face_box, log_green, shadow_step, with_gain
 
 FINEST = 1024
@@ -206,10 +203,9 @@ def table(figures: dict) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__, "scan_albedo")
     parser.add_argument("capture", type=Path)
     parser.add_argument("truth", type=Path)
-    parser.add_argument("--json", type=Path, help="where the figures go, such as research/records/scan_albedo.json")
     arguments = parser.parse_args()
     ours = score_capture(Capture(arguments.capture), arguments.truth)
     scores = {"WildCap": ours, **score_floors(arguments.truth)}

@@ -18,9 +18,6 @@ All but the last three sample the same prior with the same guidance; all are tol
 mask that the chain proposes for raw frames. Maps are kept in FOLDER/comparison (research/benchmarks/maps/rerender.py
 reads them), so that a second run goes on where the first stopped."""
 
-from __future__ import annotations
-
-import argparse
 import json
 import os
 import shutil
@@ -73,13 +70,12 @@ BLUR = 0.03  # deviation as a share of the map's side: keeps moles, takes a chee
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "comparison")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="*", default=[p.name for p in PEOPLE])
     parser.add_argument("--scan", nargs=2, type=Path, metavar=("CAPTURE", "TRUTH"))
     parser.add_argument("--size", type=int, default=512)
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     folder = options.folder.resolve()
     subjects = {name: (folder / f"{name}.wildcap", folder / name) for name in options.only}
@@ -101,13 +97,9 @@ def main() -> None:
         else {}
     )
     found |= {"scan": means([found["subjects"]["scan"]])} if "scan" in subjects else {}
-    if options.json:
-        figures.write_record(
-            options.json,
-            "comparison",
-            "python -m research.benchmarks.maps.comparison FOLDER --scan CAPTURE TRUTH",
-            found,
-        )
+    figures.write_record(
+        options.json, "comparison", "python -m research.benchmarks.maps.comparison FOLDER --scan CAPTURE TRUTH", found
+    )
     print(f"{table(found)}\n\n{paired_table(found['subjects'])}")
 
 

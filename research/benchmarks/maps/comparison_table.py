@@ -3,8 +3,6 @@
 """The tables of research/benchmarks/maps/comparison.py: means over the subjects, and ours less each other method,
 person by person."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .. import figures

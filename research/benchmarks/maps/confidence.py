@@ -12,13 +12,9 @@ most likely ones for normal errors, each capture's own size of error left free; 
 those of all others. The size itself, which no row of the likelihood needs, is the median over captures. Only figures
 are written."""
 
-from __future__ import annotations
-
-import argparse
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -66,9 +62,8 @@ class Errors:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "confidence")
     add_captures(parser)
-    parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
     captures = {
         filmed.name: read_errors(filmed)
@@ -77,8 +72,7 @@ def main() -> int:
     }
     record = measure(captures)
     print("\n\n".join(body for _, body in sections(record)))
-    if asked.json:
-        figures.write_record(asked.json, "confidence", COMMAND, record)
+    figures.write_record(asked.json, "confidence", COMMAND, record)
     return 0
 
 

@@ -8,8 +8,6 @@ counts. The texture is rendered with several rays per pixel, as the truth was: o
 against it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2

@@ -9,8 +9,6 @@ Environment (FLARE, Bharadwaj et al. 2023; split sum after Munkberg et al. 2022)
 the whole face. Both know the shadow mask no more than those methods do.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cache, partial
 

@@ -13,8 +13,6 @@ prior, which tells the rest: the angle of the normals to the true ones and the R
 what is possible, and as a draft solves and restores them, against the mean face's maps and another subject's.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 from dataclasses import replace
@@ -39,7 +37,7 @@ from core.stages.solve.skin_tone import GIVEN, SkinTone
 from ...people.skin import make_skin
 from ...training.patches import mean_map
 from ...training.skins import SCALES, carried_names, carried_skins, synthetic_skins
-from ..figures import write_record
+from ..figures import command_line, write_record
 
 COMMAND = (
     "python -m research.benchmarks.maps.prior_figures samples OUT.png --work DIR --skins FOLDER; "
@@ -52,7 +50,7 @@ FIRST_SIGMA = 7.3  # where the solver's walk begins
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__, "prior")
     commands = parser.add_subparsers(required=True)
     samples = commands.add_parser("samples")
     samples.add_argument("out", type=Path)
@@ -116,14 +114,13 @@ def show_samples(options: argparse.Namespace) -> None:
         f"median {np.median(ratios):.2f}, least {min(ratios):.2f}. Left of each pair the sample, right the training "
         "patch."
     )
-    if options.json:
-        write_record(
-            options.json,
-            "prior_figures",
-            COMMAND,
-            {"samples": {"count": options.count, "median": np.median(ratios), "least": min(ratios)}},
-            keep=True,
-        )
+    write_record(
+        options.json,
+        "prior_figures",
+        COMMAND,
+        {"samples": {"count": options.count, "median": np.median(ratios), "least": min(ratios)}},
+        keep=True,
+    )
 
 
 def card_of(weights: Path) -> dict:
@@ -173,23 +170,22 @@ def measure_response(options: argparse.Namespace) -> None:
             flush=True,
         )
     means = np.mean(rows, 0)
-    if options.json:
-        write_record(
-            options.json,
-            "prior_figures",
-            COMMAND,
-            keep=True,
-            figures={
-                "response": {
-                    name: {
-                        f"{what}_of_{whose}": means[k][part] / means[of][part]
-                        for of, whose in ((-2, "mean_face"), (-1, "another"))
-                        for part, what in enumerate(("normals", "specular"))
-                    }
-                    for k, name in enumerate(NAMES[:-2])
+    write_record(
+        options.json,
+        "prior_figures",
+        COMMAND,
+        keep=True,
+        figures={
+            "response": {
+                name: {
+                    f"{what}_of_{whose}": means[k][part] / means[of][part]
+                    for of, whose in ((-2, "mean_face"), (-1, "another"))
+                    for part, what in enumerate(("normals", "specular"))
                 }
-            },
-        )
+                for k, name in enumerate(NAMES[:-2])
+            }
+        },
+    )
     for k, name in enumerate(NAMES[:-2]):
         print(
             f"{name}: "

@@ -10,9 +10,6 @@ delit rows are taken. Each view has a gain per channel of its own (delighters an
 same way for every row. The ceiling is the texture itself in the same views: where they disagree with each other no
 albedo and no shading can explain them all."""
 
-from __future__ import annotations
-
-import argparse
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,10 +49,9 @@ class DelitFrame:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "rerender")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     people = {}
     for name in options.only:
@@ -71,8 +67,7 @@ def main() -> None:
             for row, cells in next(iter(people.values())).items()
         },
     }
-    if options.json:
-        figures.write_record(options.json, "rerender", "python -m research.benchmarks.maps.rerender FOLDER", found)
+    figures.write_record(options.json, "rerender", "python -m research.benchmarks.maps.rerender FOLDER", found)
     print(table(found))
 
 

@@ -14,9 +14,6 @@ all captures of a person together; and with the scales' prior halved and doubled
 captures solved in another way (an earlier solver, `core run --with`). Likenesses stay where they are; only figures are
 written."""
 
-from __future__ import annotations
-
-import argparse
 import sys
 from dataclasses import asdict
 from functools import cache
@@ -89,7 +86,7 @@ DOUBTFUL = 0.4
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "split")
     add_captures(parser)
     parser.add_argument(
         "--beside", nargs="+", default=[], metavar="NAME=FOLDER", help="the same captures, solved in another way"
@@ -99,7 +96,6 @@ def main() -> int:
         type=Path,
         help="draw the parts of the first capture instead of measuring; of synthetic people only in the docs",
     )
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     captures = captures_asked(parser, options)
     if options.picture:
@@ -109,8 +105,7 @@ def main() -> int:
     scores, by_capture, scales = measure(captures, {name: Path(path) for name, path in beside.items()})
     record = {**to_record(summarise(scores, COLUMNS, DELIT), scores), "captures": by_capture, "scales": scales}
     print("\n\n".join(f"{heading}\n\n{body}" for heading, body in sections(record)))
-    if options.json:
-        figures.write_record(options.json, "split", COMMAND, record)
+    figures.write_record(options.json, "split", COMMAND, record)
     return 0
 
 

@@ -13,8 +13,6 @@ the marks of research/benchmarks/maps/detail.py:
 and "leave_one_out": the aligned texture scored in LEFT_OUT frames, each time built without that frame.
 """
 
-from __future__ import annotations
-
 import tempfile
 import time
 from collections.abc import Iterable
@@ -51,11 +49,7 @@ def measure_rows(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS) ->
     head, report, results = read_head(capture), Reporter("texture"), {}
     looks = looks_of(capture, head.caster, truth)
     if "delit" in rows and any(capture.delit.glob("*.png")):
-        results["delit"] = _row(
-            "aligned",
-            *texture.observe_all(capture, head, SIZE, report)[:2],
-            looks,
-        )
+        results["delit"] = _row("aligned", *texture.observe_all(capture, head, SIZE, report)[:2], looks)
     with tempfile.TemporaryDirectory() as folder:
         copy = begin_at_delight(capture, Path(folder) / "copy.wildcap")
         delighter = from_json({"delight": {"delighter": "folder", "folder": str(truth.absolute() / "albedo")}})

@@ -10,9 +10,6 @@ is painted into a family of skins cannot be told from its traits, so both extrem
 traits, and all of it that the light of a sky explains (research/training/skins.py) taken out. z is a skin's difference
 from the others' median over the deviation that those others have there: one skin is left out at a time."""
 
-from __future__ import annotations
-
-import argparse
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -38,9 +35,8 @@ PAIRS = 200_000
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "traits")
     parser.add_argument("skins", type=Path)
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     mean = load().mean_face
     record = {
@@ -48,8 +44,7 @@ def main() -> int:
         UNLIT: measure(read_shapes(options.skins, lambda skin: unshaded(skin, mean))),
     }
     print("\n\n".join(body for _, body in sections(record)))
-    if options.json:
-        figures.write_record(options.json, "traits", COMMAND, record)
+    figures.write_record(options.json, "traits", COMMAND, record)
     return 0
 
 

@@ -14,9 +14,6 @@ correlation with the truth of what is finer than a texel of the 1024 map, moles 
 it. cost: 1024 to 4096 in a process of its own, seconds and peak memory.
 """
 
-from __future__ import annotations
-
-import argparse
 import resource
 import tempfile
 import time
@@ -47,7 +44,7 @@ from ...people.parameters import sample_parameters
 from ...people.skin import make_skin
 from ...training.fine_windows import CHANNELS, FACTOR, Degradation, degraded, prepare
 from ..captures.shadow_captures import render_picture, write_views
-from ..figures import markdown, write_record
+from ..figures import command_line, markdown, write_record
 from .ablation_measures import feature_distance
 from .detail import moles
 
@@ -63,13 +60,8 @@ CLOSE = 9.0
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__, "upscale")
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_upscale_benchmark")
-    parser.add_argument(
-        "--json",
-        type=Path,
-        help="where the figures go, such as research/records/upscale.json; those of other rows stay",
-    )
     parser.add_argument("--picture", type=Path, help="close-ups of small map, Lanczos, network and truth side by side")
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)

@@ -10,8 +10,6 @@ and the colour is off by a few percent over large regions, as a delighter leaves
 `make_plain_problem` has a sky and a sun as they are, and noise.
 """
 
-from __future__ import annotations
-
 import hashlib
 import tempfile
 from dataclasses import dataclass, replace

@@ -8,8 +8,6 @@ beside error to truth and detail; and two registrations never agree perfectly, s
 ones, says how well an answer can.
 """
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

@@ -6,8 +6,6 @@ do, and coverage of one sigma.
 Errors and sigmas are differences of natural logarithms of albedo, or of anything else that both share; [N].
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,8 +8,6 @@ a line brighter or darker than both sides is what a border that was misplaced or
 first. Lengths are shares of the face's height, so that pictures of any size compare.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2

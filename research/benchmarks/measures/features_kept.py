@@ -8,8 +8,6 @@ not delit keeps everything, light included: `joint` stands beside it, which comp
 lights with the photographs' own.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

@@ -6,8 +6,6 @@ rest.
 All parts share the one gain per channel of the whole face: a brow that is bleached is an error, not a tone.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

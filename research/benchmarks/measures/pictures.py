@@ -7,8 +7,6 @@ Pictures are sRGB float32 [H, W, 3] in [0, 1], masks bool [H, W]. The gain per c
 a skin tone would supply.
 """
 
-from __future__ import annotations
-
 import math
 
 import cv2

@@ -8,8 +8,6 @@ blur divided out  what one does by hand: keeps what is small, light and skin ali
 true light        the true light divided out: what the registration and the texture leave
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

@@ -11,8 +11,6 @@ is linear. Least squares with Huber's weights (Huber 1964), so that a shadow tha
 bend a light that is not.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,8 +8,6 @@ not in proportion); a flat colour 0 and 0. No answer that treats pigment and lig
 number for both.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 DARKEST = 1e-3

@@ -7,8 +7,6 @@ People differ far more than methods do: means of four to ten of them that differ
 for sure, and the paired differences tell. A cell holds only people who have that measure.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

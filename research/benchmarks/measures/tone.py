@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The gain per channel before which no tone counts, and PSNR after it, on lists of texels."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from core.imaging import images

@@ -7,9 +7,6 @@ Maps and heads are the true ones, so the pictures show what hair, eyes and mouth
 Cycles's linear light under the sRGB curve (Blender's view transform Standard).
 """
 
-from __future__ import annotations
-
-import argparse
 import importlib
 import subprocess
 import sys
@@ -18,6 +15,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+
+from ..figures import command_line
 
 ROOT = Path(__file__).resolve().parents[3]
 LIGHTS = ("three_point", "overcast", "sun")
@@ -54,7 +53,7 @@ def run_closeups(module: str, description: str, shots: Shots, resolution: int, s
 
     shots: name of a person -> name of a picture -> what it shows; resolution: pixels of a side, where the command
     does not say."""
-    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("folder", type=Path, help="keeps captures and renders; finished renders are taken as they are")
     parser.add_argument("out", type=Path)
     parser.add_argument("--only", nargs="+", metavar="NAME", help="of the six people")

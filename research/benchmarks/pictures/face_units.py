@@ -6,14 +6,12 @@ browInnerUp, a wink and a smile; with the eyes and the mouth of Close-Up Eyes.
     python -m research.benchmarks.pictures.face_units .demo/sample.wildcap docs/pictures/face_units.jpg
 """
 
-from __future__ import annotations
-
-import argparse
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
+from ..figures import command_line
 from .closeups import CloseUp, shoot_closeup
 from .render_capture import extension
 
@@ -35,7 +33,7 @@ SHOTS = {
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("capture", type=Path, help="solved, its eyes filmed closed, as `make demo` leaves it")
     parser.add_argument("out", type=Path)
     parser.add_argument("--resolution", type=int, default=320, help="pixels of a picture's side")

@@ -12,9 +12,6 @@ Blender's view transform Standard, no look, exposure as the presets have it. Ren
 taken as they are.
 """
 
-from __future__ import annotations
-
-import argparse
 import os
 import subprocess
 import sys
@@ -28,6 +25,7 @@ from core.geometry import meshes, raster
 from core.geometry.views import View, read_views
 from core.imaging import images
 
+from ..figures import command_line
 from .sheet import in_rows, write_small
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -38,7 +36,7 @@ CHEEK, CLOSE_UP = 203, 0.11
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("capture", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--truth", type=Path)

@@ -7,9 +7,6 @@
 Pictures of people never go into the documentation.
 """
 
-from __future__ import annotations
-
-import argparse
 from pathlib import Path
 
 import cv2
@@ -20,13 +17,14 @@ from core.geometry import meshes, raster
 from core.geometry.views import View, read_views
 from core.imaging import images
 
+from ..figures import command_line
 from .sheet import write_small
 
 HEIGHT = 480
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("capture", type=Path, help="reconstructed up to its texture, as `make demo` leaves it")
     parser.add_argument("out", type=Path)
     options = parser.parse_args()

@@ -3,8 +3,6 @@
 """A contact sheet of the people of research/benchmarks/captures/likenesses.py: front, three-quarter, an eye and its
 brow close to, and the bare skin below hair and clothes."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

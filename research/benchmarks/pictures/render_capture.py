@@ -10,9 +10,6 @@ a look, and the linear renders/LIGHT.exr; --contact-sheet joins all presets to r
 itself: blender --command wildcap ...)
 """
 
-from __future__ import annotations
-
-import argparse
 import contextlib
 import os
 import tempfile
@@ -20,6 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ...people.blender_module import without_numpy_1
+from ..figures import command_line
 
 ROOT = Path(__file__).resolve().parents[3]
 EXTENSION = "bl_ext.user_default.wildcap"
@@ -27,7 +25,7 @@ EXTENSION = "bl_ext.user_default.wildcap"
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("capture", type=Path)
     parser.add_argument("lights", nargs="*", metavar="LIGHT")
     parser.add_argument("--resolution", type=int, default=640)

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lay pictures out in rows and write them as a small JPEG. Pictures are sRGB [H, W, 3]."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -6,9 +6,6 @@ own.
     python -m research.benchmarks.pictures.subjects_sheet docs/pictures/subjects.jpg
 """
 
-from __future__ import annotations
-
-import argparse
 import tempfile
 from pathlib import Path
 
@@ -20,6 +17,7 @@ from ...people import scene
 from ...people.parameters import sample_parameters
 from ...people.sample import render_frames
 from ...people.skin import make_skin
+from ..figures import command_line
 from .sheet import in_rows, write_small
 from .video_examples import around
 
@@ -30,7 +28,7 @@ MAPS, SAMPLES = 1024, 24
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("out", type=Path)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as work:

@@ -6,9 +6,6 @@ head under three lights.
     python -m research.benchmarks.pictures.teaser .demo/sample.wildcap docs/pictures/teaser.jpg
 """
 
-from __future__ import annotations
-
-import argparse
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +14,7 @@ from core.capture.capture import Capture
 from core.geometry.views import read_views
 from core.imaging import images
 
+from ..figures import command_line
 from .sheet import in_rows, square
 
 SIDE = 480
@@ -24,7 +22,7 @@ LIGHTS = "sun", "three_point", "window"
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("capture", type=Path, help="solved and rendered, as `make demo` leaves it")
     parser.add_argument("target", type=Path)
     arguments = parser.parse_args()

@@ -8,9 +8,6 @@ docs/pictures/film_good.jpg: five frames of one arc from ear to ear. docs/pictur
 too far, too near, a bare background, burnt out, too dark.
 """
 
-from __future__ import annotations
-
-import argparse
 import tempfile
 from pathlib import Path
 
@@ -22,6 +19,7 @@ from ...people import scene
 from ...people.parameters import sample_parameters
 from ...people.sample import MAPS, RESERVED, render_frames
 from ...people.skin import make_skin
+from ..figures import command_line
 
 SCALE, SAMPLES = 0.4, 24
 SWING_DEG, BLUR = 4.0, 9
@@ -29,7 +27,7 @@ SWING_DEG, BLUR = 4.0, 9
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("folder", type=Path)
     folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)

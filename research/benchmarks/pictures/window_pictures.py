@@ -10,9 +10,6 @@ They show the sample head and nothing else; of set_up, which installs the solver
 picture whose screenshots are not there is named, and the old one stays.
 """
 
-from __future__ import annotations
-
-import argparse
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +18,7 @@ import numpy as np
 
 from core.imaging import images
 
-from ..figures import ROOT
+from ..figures import ROOT, command_line
 
 SHOTS, TARGET = ROOT / "dist" / "gui", ROOT / "docs" / "pictures"
 QUALITY = 88
@@ -56,7 +53,7 @@ PICTURES = {
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--only", nargs="+", choices=PICTURES, default=list(PICTURES))
     missing = 0
     for name in parser.parse_args().only:

@@ -13,9 +13,6 @@ No picture is made here of what is in the repository alone. teaser.jpg and galle
 --captures names a folder with sample.wildcap (as `make demo` leaves it) and NAME.wildcap
 (research/benchmarks/captures/people.py). Others are made by their page's benchmark (--picture, --pictures)."""
 
-from __future__ import annotations
-
-import argparse
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -34,7 +31,7 @@ NAMES = tuple(module.name for module in iter_modules(__path__) if module.name !=
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__)
     parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 where something differs")
     parser.add_argument("--captures", type=Path, help="solved captures, for teaser.jpg and the gallery's pictures")
     options = parser.parse_args()

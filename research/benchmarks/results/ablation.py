@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/ablation.md: what each part of the solver is worth."""
 
-from __future__ import annotations
-
 from ..figures import Figures
 from ..maps.ablation import table
 from ..pages import Sections, prose

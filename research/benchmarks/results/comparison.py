@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/comparison.md: albedo against the truth, beside other light models."""
 
-from __future__ import annotations
-
 from ..figures import Figures
 from ..maps.comparison_table import paired, paired_table, table
 from ..pages import Sections, prose

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/confidence.md: how far the confidence map knows the error."""
 
-from __future__ import annotations
-
 from ..figures import Figures
 from ..maps import confidence
 from ..pages import Sections

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/controlled.md: the gap to a controlled capture, and studio input."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..figures import Figures

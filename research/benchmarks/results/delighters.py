@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/delighters.md: what takes the light out of the frames, against the true albedo."""
 
-from __future__ import annotations
-
 from statistics import mean, stdev
 
 from ..captures import likenesses, scan_captures

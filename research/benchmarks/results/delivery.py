@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/delivery.md: other meshes, and what is delivered."""
 
-from __future__ import annotations
-
 from ..figures import Figures, markdown
 from ..pages import Sections, prose
 

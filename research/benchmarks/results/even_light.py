@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/even_light.md: what skin gives back of its albedo in Cycles."""
 
-from __future__ import annotations
-
 from ..figures import Figures
 from ..light.even_light import WORDS, table
 from ..pages import Sections

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/eyes.md: open eyes that were found in frames, against the true ones."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...people.lifelike.person import sample_person

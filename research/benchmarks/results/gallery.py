@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/gallery.md: six people, every map, four lights. Without a record; --captures makes its pictures."""
 
-from __future__ import annotations
-
 from ..pages import Sections, prose
 
 TITLE = "The gallery"

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/geometry.md: cameras, scan, head and texture against the truth."""
 
-from __future__ import annotations
-
 from ..figures import Figures
 from ..head.geometry import table
 from ..pages import Sections, prose

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/hair.md: hair that is grown from pictures, against people whose every hair is known."""
 
-from __future__ import annotations
-
 from ..figures import Figures
 from ..head.groomed import WORDS, shortfalls, to_table
 from ..pages import Sections

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/photographs.md: the delighter on single photographs."""
 
-from __future__ import annotations
-
 from ..delighting.photographs import COLUMNS, TITLES, WORDS
 from ..figures import Figures
 from ..measures.table import format_table, summarise

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/prior.md: the diffusion prior by itself."""
 
-from __future__ import annotations
-
 from ..figures import Figures
 from ..maps import traits as benchmark
 from ..pages import Sections, prose

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/relit.md: the number that artists feel, the head under another light."""
 
-from __future__ import annotations
-
 from ..figures import Figures
 from ..light.relit import table
 from ..pages import Sections, prose

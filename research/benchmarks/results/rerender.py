@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/rerender.md: face reconstruction, as in the paper's Table 1."""
 
-from __future__ import annotations
-
 from ..figures import Figures
 from ..maps.rerender import table
 from ..pages import Sections, prose

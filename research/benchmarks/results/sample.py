@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/sample.md: the sample video, whose truth is known, by `make demo`."""
 
-from __future__ import annotations
-
 from ..figures import Figures
 from ..maps.albedo_score import table
 from ..pages import Sections, prose

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/scan.md: the one real skin, a head scan under hard sun."""
 
-from __future__ import annotations
-
 from ..figures import Figures
 from ..maps.albedo_score import table
 from ..pages import Sections, prose

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/shadows.md: the mask that is proposed."""
 
-from __future__ import annotations
-
 from ..figures import Figures, markdown
 from ..pages import Sections, prose
 
@@ -51,5 +49,5 @@ def sections(proposed: Figures) -> Sections:
         find after it. The proposal has no measure yet on real people, whose shadows nobody has drawn.
         """,
             ),
-        ),
+        )
     ]

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/skin_tone.md: how light the skin is, from the frames alone and with a card."""
 
-from __future__ import annotations
-
 from ..figures import Figures, markdown
 from ..pages import Sections, prose
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/split.md: what telling skin and light apart is worth."""
 
-from __future__ import annotations
-
 from ..figures import Figures
 from ..maps import split
 from ..pages import Sections, prose

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/state.md: the albedo on people like people, by the measures that tell light from skin."""
 
-from __future__ import annotations
-
 from ..delighting import state
 from ..figures import Figures
 from ..pages import Sections

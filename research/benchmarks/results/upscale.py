@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/upscale.md: four times as many texels."""
 
-from __future__ import annotations
-
 from ..figures import Figures, markdown
 from ..pages import Sections, prose
 

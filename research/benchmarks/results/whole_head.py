@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/whole_head.md: what is completed where nobody looked, and the hair's masks."""
 
-from __future__ import annotations
-
 from ..figures import Figures, markdown
 from ..pages import Sections, prose
 from .split import OLDER
