@@ -39,7 +39,7 @@ def command_line(doc: str, record: str = "") -> argparse.ArgumentParser:
     return parser
 
 
-def run_python(*words: str | Path, quiet: bool = False) -> int:
+def run_python(*words: object, quiet: bool = False) -> int:
     """Return the exit code of `python -m WORDS`, run in the checkout; `quiet` drops its standard output."""
     command = [sys.executable, "-m", *map(str, words)]
     return subprocess.call(command, cwd=ROOT, stdout=subprocess.DEVNULL if quiet else None)

@@ -17,7 +17,7 @@ import tempfile
 import tomllib
 from pathlib import Path
 
-from core import __main__ as command_line
+from core import __main__ as program
 from core.batch.shots import HEADINGS
 from core.capture import capture_record, stages
 from core.capture.files import write_json
@@ -48,7 +48,7 @@ def take_inventory() -> dict:
         "batch_table": list(HEADINGS),
         "capture_record": sorted(capture_record.ENTRY),
         "figures": _figures(),
-        "command_line": _commands(command_line._parser()),
+        "command_line": _commands(program._parser()),
         "classes": _classes(addon),
         "saved_names": sorted({name for tree in addon for name in _saved_names(tree)}),
         "zip": _zip_files(),

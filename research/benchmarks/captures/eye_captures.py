@@ -9,7 +9,6 @@ FOLDER/SEED.wildcap has frames, cameras and head; truth/ in it the closed and th
 each; what is there is not made again.
 """
 
-import os
 from dataclasses import asdict
 from pathlib import Path
 
@@ -79,5 +78,4 @@ def photograph_person(folder: Path, seed: int, kind: str, facekit: Path | None) 
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     main()

@@ -19,7 +19,6 @@ not made again. With --facekit (ICT-FaceKit's folder) the heads' shape is derive
 heads of the same people.
 """
 
-import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -114,5 +113,4 @@ def photograph_again(person: people.FilmedPerson, folder: Path, light: str) -> N
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     main()

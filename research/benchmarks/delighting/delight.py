@@ -40,14 +40,13 @@ from core.settings.settings import Settings
 from core.stages import delight
 
 from .. import figures
+from ..figures import SAMPLE, SHARED
 from ..measures.pictures import with_gain
 from ..pictures.sheet import write_small
 from .delight_measures import flat_tone, mean_of, score_picture, sheet, shortfalls, square, table, tone_group
 from .delight_portraits import make_portraits
 from .delight_sets import Photograph, Photographs, light_stage, registered, select_true_frames
 
-SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
-SAMPLE = Path(__file__).resolve().parents[3] / "research" / "people" / "sample"
 SETS = ("faceolat", "portraits", "lps_sun", "sample")
 BROUGHT = ("none", "folder", "switchlight", "opendelight")
 """Delighters that need something of the user's, or nothing at all: no rows of their own on captures."""
@@ -91,11 +90,7 @@ def main() -> None:
     if options.weights:
         importlib.import_module("core.stages.delight.network").WEIGHTS = options.weights
     captures = dict(pair.split("=", 1) for pair in options.capture)
-    results = (
-        figures.read_record(options.json.stem, options.json.parent)["figures"]
-        if options.json and options.json.is_file()
-        else {}
-    )
+    results = figures.read_figures(options.json)
     for name in options.sets:
         title = Path(name).name
         with tempfile.TemporaryDirectory() as folder:

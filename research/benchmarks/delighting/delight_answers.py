@@ -36,6 +36,7 @@ from ...people.lifelike.figure import make_figure
 from .. import figures
 from ..captures.eye_captures import EYES
 from ..captures.state_captures import SIZE, Filmed, find
+from ..figures import SAMPLE
 from ..measures.references import TRUE
 
 COMMAND = (
@@ -43,7 +44,6 @@ COMMAND = (
     "--json research/records/delight_answers.json"
 )
 SHARES, DOUBTS = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0), (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0)
-SAMPLE = figures.ROOT / "research" / "people" / "sample"
 GRID = tuple(Weighing(share, doubt) for share, doubt in product(SHARES, DOUBTS))
 BARE = 0.5  # share of bare skin in a cell from which it counts, as in second_opinion.weigh_in
 DARKEST = 2e-3

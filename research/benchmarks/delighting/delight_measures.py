@@ -14,7 +14,7 @@ import numpy as np
 from core.imaging import images
 
 from ...people import pigment
-from ..figures import markdown
+from ..figures import markdown, number
 from ..maps.ablation_measures import feature_distance
 from ..maps.albedo_score import AlbedoTruth
 from ..measures.pictures import detail, differences, edge_bands, face_box, log_green, shadow_step, with_gain
@@ -155,9 +155,4 @@ def sheet(photographs: list[list[np.ndarray]], side: int = 192) -> np.ndarray:
 
 def _line(name: str, row: str, found: dict) -> list:
     digits, figures = {"psnr": 2, "detail": 2, "shadow_step": 2}, found["figures"]
-    return [
-        name,
-        row,
-        found["pictures"],
-        *(None if figures[f] is None else f"{figures[f]:.{digits.get(f, 3)}f}" for f in FIGURES),
-    ]
+    return [name, row, found["pictures"], *(number(figures[f], digits.get(f, 3)) for f in FIGURES)]

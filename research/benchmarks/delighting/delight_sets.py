@@ -3,8 +3,6 @@
 """What research/benchmarks/delighting/delight.py measures on: photographs with a known albedo, single ones and those of
 a registered capture."""
 
-import subprocess
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from core.geometry.views import read_views
 from core.imaging import images
 
 from ..captures.continued import begin_at_delight
+from ..figures import run_python
 from ..maps.albedo_score import AlbedoTruth, read_truth
 
 
@@ -104,16 +103,7 @@ def registered(truth: Path, work: Path) -> Capture:
     the next time."""
     capture = Capture(work / f"{truth.name}.wildcap")
     if not capture.head.is_file():
-        command = [
-            sys.executable,
-            "-m",
-            "core",
-            "run",
-            str(truth / "capture.mp4"),
-            str(capture.root),
-            "--until",
-            "registration",
-        ]
-        if subprocess.run(command, stdout=sys.stderr, check=False).returncode != 0:
+        # standard output is the benchmark's own
+        if run_python("core", "run", truth / "capture.mp4", capture.root, "--until", "registration", quiet=True):
             raise Problem(f"{truth / 'capture.mp4'} could not be registered.", f"Look at {capture.report}.")
     return capture

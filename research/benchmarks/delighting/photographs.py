@@ -31,6 +31,7 @@ from core.settings.settings import Settings
 from core.stages import delight
 
 from .. import figures
+from ..figures import SHARED
 from ..measures.agreement import disagreement
 from ..measures.features_kept import contrast_kept, contrasts, joint
 from ..measures.pictures import detail, log_green
@@ -41,7 +42,6 @@ from ..measures.tone import psnr_after_gain, to_decibels
 from .delight_portraits import subjects_by_tone
 from .pairs import pairs
 
-SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
 COMMAND = "python -m research.benchmarks.delighting.photographs --json research/records/photographs.json"
 LIT = 0.05
 """Share of a lit picture's 98th percentile above which a pixel is lit by its lamp."""

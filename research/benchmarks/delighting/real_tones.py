@@ -11,8 +11,6 @@ photographed before a light ground; they are also cut out over white and over bl
 checkout of it, with its estimate_from_frames in the place of estimate_skin_tone.
 """
 
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -28,9 +26,8 @@ from core.stages.solve.capture_evidence import read_evidence
 from core.stages.solve.population import to_lab
 from core.stages.solve.tone import TONE_SIDE_TEXELS, estimate_skin_tone
 
-from ..figures import ROOT, command_line, write_record
+from ..figures import SAMPLE, command_line, run_python, write_record
 
-SAMPLE = ROOT / "research" / "people" / "sample"
 LONDON = {
     "025": "black",
     "042": "black",
@@ -64,23 +61,9 @@ def main() -> None:
         capture = Capture(options.folder / f"{name}.wildcap")
         if not capture.shadow_mask_auto.is_file():
             source = options.folder / "sources" / name
-            subprocess.run(
-                [
-                    sys.executable,
-                    "-m",
-                    "core",
-                    "run",
-                    str(prepare(source)),
-                    str(capture.root),
-                    "--until",
-                    "shadow_mask",
-                    "--quality",
-                    "draft",
-                ],
-                cwd=ROOT,
-                check=True,
-                stdout=subprocess.DEVNULL,
-            )
+            words = ("core", "run", prepare(source), capture.root, "--until", "shadow_mask", "--quality", "draft")
+            if code := run_python(*words, quiet=True):
+                raise SystemExit(code)
         figures[name] = {options.row: estimate(capture)}
         print(name, *figures[name][options.row].values(), flush=True)
     write_record(

@@ -279,9 +279,9 @@ def by_capture_table(by_capture: dict[str, dict[str, Figures]]) -> str:
         lines.append(
             [
                 name,
-                *(_text(psnr.get(method)) for method in METHODS),
+                *(figures.number(psnr.get(method), 2) for method in METHODS),
                 _gain(psnr),
-                *(_text(shared.get(method)) for method in (DELIT, SOLVED)),
+                *(figures.number(shared.get(method), 2) for method in (DELIT, SOLVED)),
                 _gain(shared),
             ]
         )
@@ -290,10 +290,6 @@ def by_capture_table(by_capture: dict[str, dict[str, Figures]]) -> str:
 
 def _gain(psnr: Figures) -> str | None:
     return None if None in (psnr.get(DELIT), psnr.get(SOLVED)) else f"{psnr[SOLVED] - psnr[DELIT]:+.2f}"
-
-
-def _text(figure: float | None) -> str | None:
-    return None if figure is None else f"{figure:.2f}"
 
 
 if __name__ == "__main__":

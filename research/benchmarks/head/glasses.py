@@ -28,8 +28,8 @@ from ...people.lifelike import glasses
 from ...training import glasses as training
 from .. import figures
 from ..captures.films import read_film
+from ..figures import SHARED
 
-SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
 COMMAND = "python -m research.benchmarks.head.glasses DATA --hdri DATA/hdri --json research/records/glasses.json"
 BARE, SEEN = 3, 4
 """Captures without glasses of each held-out figure, beside one with each kind of them; photographs of a capture."""

@@ -36,7 +36,7 @@ from ...people.lifelike.figure import paint
 from ...people.lifelike.person import sample_person
 from ..captures.eye_captures import EYES
 from ..captures.likenesses import HELD_BACK, LIKENESSES
-from ..figures import command_line, markdown, write_record
+from ..figures import command_line, markdown, number, write_record
 from .cameras_against_truth import place_truth
 
 COLUMNS = (
@@ -76,11 +76,7 @@ def main() -> None:
             rows[f"{name}, {side}"] = row
     print(
         markdown(
-            ["eye", *COLUMNS],
-            [
-                [name, *(None if row[column] is None else f"{row[column]:.2f}" for column in COLUMNS)]
-                for name, row in rows.items()
-            ],
+            ["eye", *COLUMNS], [[name, *(number(row[column], 2) for column in COLUMNS)] for name, row in rows.items()]
         )
     )
     write_record(

@@ -17,7 +17,6 @@ network what always says where parts usually are: the mean of the other people's
 head that is taken for skin; skin_as_hair: the reverse. The sheet of photographs is for looking only.
 """
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -34,7 +33,7 @@ from ...people.lifelike.figure import make_figure
 from ...people.lifelike.truth import Scene
 from ..captures.films import read_film
 from ..captures.likenesses import LIKENESSES
-from ..figures import command_line, markdown, write_record
+from ..figures import command_line, markdown, number, write_record
 
 VIEWS, SIZE, TEXELS = 8, 400, 1024
 SPARSE = 4.0
@@ -84,7 +83,7 @@ def main() -> None:
     lines = []
     for name, r in rows.items():
         shares = (*r["iou"].values(), r["hair_as_skin"], r["skin_as_hair"])
-        lines.append([name, f"{r['found']} of {r['pictures']}", *(None if v is None else f"{v:.2f}" for v in shares)])
+        lines.append([name, f"{r['found']} of {r['pictures']}", *(number(v, 2) for v in shares)])
     print(markdown(["person", "found", *PARTS, "hair as skin", "skin as hair"], lines))
     write_record(
         options.json,
@@ -107,9 +106,9 @@ def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 def filmed(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Return the frames with truth of a filmed person and their shares, each hair SPARSE times."""
     names = sorted(path.stem for path in (folder / "parts" / "hair").glob("*.png"))
-    for number, frame in enumerate(read_film(folder / "capture.mp4")):
-        if f"{number:04d}" in names:
-            parts = np.stack([images.read_mask(folder / "parts" / part / f"{number:04d}.png") for part in GROWN], -1)
+    for index, frame in enumerate(read_film(folder / "capture.mp4")):
+        if f"{index:04d}" in names:
+            parts = np.stack([images.read_mask(folder / "parts" / part / f"{index:04d}.png") for part in GROWN], -1)
             shares = unlit.true_shares(parts)
             shares[..., [PARTS.index(name) for name in HAIRS]] *= SPARSE
             yield frame.astype(np.float32) / 255, shares / shares.sum(-1, keepdims=True)
@@ -180,5 +179,4 @@ def write_sheet(out: Path, pictures: list[Path], network: ParseNet) -> None:
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     main()

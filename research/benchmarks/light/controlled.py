@@ -70,11 +70,7 @@ def main() -> int:
     found = {name: rows for name in options.only if (rows := measure(folder, name))}
     if not found:
         parser.error(f"{folder} holds no capture of research/benchmarks/captures/people.py.")
-    known = (
-        figures.read_record(options.json.stem, options.json.parent)["figures"]["people"]
-        if options.json and options.json.exists()
-        else {}
-    )
+    known = figures.read_figures(options.json).get("people", {})
     everyone = figures.merged(known, found)
     people = {p.name: everyone[p.name] for p in PEOPLE if p.name in everyone}
     summary = {"people": people, "mean": means(people)}

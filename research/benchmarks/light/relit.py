@@ -22,8 +22,6 @@ albedos share the truth's mean over confident facial skin. WORK keeps the render
 and textures are taken as they are."""
 
 import argparse
-import os
-import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -41,7 +39,8 @@ from ...people.parameters import sample_parameters
 from ...people.pigment import LUMINANCE
 from ...people.skin import make_skin
 from .. import figures
-from ..captures.people import PEOPLE, write_maps
+from ..captures.people import PEOPLE
+from ..captures.truth_files import write_maps
 from ..head.head_against_truth import pose_of_truth
 from ..measures.pictures import differences, face_box
 from .relit_maps import Worn, face_mask, read_rows, read_worn, worn_by, write_row
@@ -192,12 +191,8 @@ def render_rows(subject: RelitSubject, work: Path, lights: list[str], row_names:
             "samples": SAMPLES,
         },
     )
-    subprocess.run(
-        [sys.executable, "-m", "research.benchmarks.light.relit_renders", str(work / "job.json")],
-        cwd=figures.ROOT,
-        check=True,
-        stdout=subprocess.DEVNULL,
-    )
+    if figures.run_python("research.benchmarks.light.relit_renders", work / "job.json", quiet=True):
+        raise SystemExit("The renders failed.")
 
 
 def is_newer(picture: Path, capture: Capture, truth: Path) -> bool:
@@ -302,5 +297,4 @@ def table(results: dict[str, dict[str, dict[str, float]]]) -> str:
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     sys.exit(main())

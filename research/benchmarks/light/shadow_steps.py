@@ -101,7 +101,7 @@ def table(rows: dict[str, dict]) -> str:
             [
                 name,
                 *(f"{row[kind]:.2f} ± {row[f'{kind}_spread']:.2f}" for kind in ("removed", "seen", "left")),
-                *(None if row[key] is None else f"{row[key]:.2f}" for key in ("left_of_others", "taken", "best")),
+                *(figures.number(row[key], 2) for key in ("left_of_others", "taken", "best")),
             ]
             for name, row in rows.items()
         ],

@@ -15,7 +15,7 @@ from core.capture.messages import Problem
 from core.imaging import images
 from core.stages.texture.features import load_features
 
-from ..figures import markdown
+from ..figures import markdown, number
 
 REGIONS = ("shadow", "band", "outside")
 FIGURES = ("psnr", "ssim", "flip", "features")
@@ -123,7 +123,7 @@ def table(figures: dict[str, dict]) -> str:
                         f"{r['problems']} x {r['seeds']}",
                         f"{r['psnr']:.2f}",
                         "" if row == first else _compared(r["to_first"], spread),
-                        *(None if r[figure] is None else f"{r[figure]:.3f}" for figure in known),
+                        *(number(r[figure], 3) for figure in known),
                         f"{r['seconds']:.0f}",
                     ]
                     for row, r in figures[region].items()

@@ -28,7 +28,7 @@ from core.geometry.views import read_views
 from core.imaging import images
 
 from ..captures.films import read_film
-from ..figures import command_line, markdown, write_record
+from ..figures import command_line, markdown, number, write_record
 from ..measures.pictures import detail, differences, face_box, log_green, shadow_step, with_gain
 
 FINEST = 1024
@@ -132,8 +132,8 @@ def score_floors(truth: Path) -> dict:
     """Return what has to be beaten: the raw video taken for albedo, and the true mean skin colour everywhere."""
     frames = {true.frame: true for true in read_truth(truth)}
     raw, flat = [], []
-    for number, image in enumerate(read_film(truth / "capture.mp4")):
-        if (true := frames.get(number)) is not None:
+    for frame, image in enumerate(read_film(truth / "capture.mp4")):
+        if (true := frames.get(frame)) is not None:
             raw.append(compare(image.astype(np.float32) / 255, true, true.face))
             tone = images.linear_to_srgb(images.srgb_to_linear(true.albedo[true.face]).mean(0))
             flat.append(compare(np.broadcast_to(tone, true.albedo.shape), true, true.face))
@@ -195,7 +195,7 @@ def table(figures: dict) -> str:
                 f"{r['ssim']:.3f}",
                 f"{r['flip']:.3f}",
                 f"{r['detail']:.2f}",
-                None if r["shadow_step"] is None else f"{r['shadow_step']:.2f}",
+                number(r["shadow_step"], 2),
             ]
             for name, r in figures["rows"].items()
         ],

@@ -19,7 +19,6 @@ mask that the chain proposes for raw frames. Maps are kept in FOLDER/comparison 
 reads them), so that a second run goes on where the first stopped."""
 
 import json
-import os
 import shutil
 import time
 from collections.abc import Callable
@@ -226,5 +225,4 @@ def _prior():
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     main()

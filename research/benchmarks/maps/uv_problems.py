@@ -34,6 +34,7 @@ from ...people.light import bake, random_light
 from ...people.parameters import sample_parameters
 from ...people.skin import make_skin
 from ...training.carry import carry
+from ..figures import SHARED
 
 SHADOWS = {"leaves, hard": ("leaves", 0.005), "edge, half soft": ("edge", 0.012), "blinds, soft": ("blinds", 0.025)}
 """Name -> (what throws it, angular radius of the sun in radians). The head's own shadow (nose, brow, chin) falls on
@@ -43,7 +44,7 @@ MASKED = 0.12, 0.5
 skin nearly black."""
 UNEXPLAINED = 0.10  # of the light, root mean square: what second-order SH cannot explain
 NOISE = 0.004  # deviation, linear
-LEE_PERRY_SMITH = Path(__file__).parents[4] / "shared" / "data" / "lee_perry_smith"
+LEE_PERRY_SMITH = SHARED / "lee_perry_smith"
 CACHE = Path(tempfile.gettempdir()) / "wildcap_ablation"
 
 

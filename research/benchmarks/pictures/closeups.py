@@ -8,7 +8,6 @@ Cycles's linear light under the sRGB curve (Blender's view transform Standard).
 """
 
 import importlib
-import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -16,9 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..figures import command_line
+from ..figures import command_line, run_python
 
-ROOT = Path(__file__).resolve().parents[3]
 LIGHTS = ("three_point", "overcast", "sun")
 SEAMS = {"mouth": 0, "eye": 1}
 """Where the camera looks: the middle of what the face units cut open there (the eye on the person's left)."""
@@ -73,18 +71,9 @@ def run_closeups(module: str, description: str, shots: Shots, resolution: int, s
     rows = []
     # each in a process of its own: what EEVEE has compiled for one head, it does not give back
     for capture in captures:
-        words = [f"{__package__}.{module}", str(capture), str(options.resolution), str(options.samples)]
-        subprocess.run(
-            [
-                sys.executable,
-                "-m",
-                "research.benchmarks.pictures.closeups",
-                f"research.benchmarks.pictures.{module}",
-                *words,
-            ],
-            cwd=ROOT,
-            check=True,
-        )
+        words = (f"{__package__}.{module}", capture, options.resolution, options.samples)
+        if code := run_python(f"{__package__}.closeups", *words):
+            raise SystemExit(code)
         rows.append(
             np.concatenate([images.read_srgb(capture / "renders" / f"{name}.png") for name in shots(capture.stem)], 1)
         )
@@ -105,7 +94,7 @@ def prepare(folder: Path, name: str, seed: int) -> Path:
     from ...people.identities import subject_mesh
     from ...people.parameters import sample_parameters
     from ...people.skin import make_skin
-    from ..captures.people import write_maps
+    from ..captures.truth_files import write_maps
 
     capture = Capture(folder / f"{name}.wildcap")
     if not (capture.maps_4k / "strands.npz").is_file():

@@ -12,9 +12,6 @@ Blender's view transform Standard, no look, exposure as the presets have it. Ren
 taken as they are.
 """
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -25,10 +22,9 @@ from core.geometry import meshes, raster
 from core.geometry.views import View, read_views
 from core.imaging import images
 
-from ..figures import command_line
+from ..figures import command_line, run_python
 from .sheet import in_rows, write_small
 
-ROOT = Path(__file__).resolve().parents[3]
 LIGHTS = ("three_point", "window", "sun", "city.exr")
 TILE, RESOLUTION, SAMPLES = 224, 320, 24  # pixels, pixels, rays per pixel
 # MediaPipe's landmark beside the nose, on the person's right; side of the close-up as a share of the map
@@ -94,23 +90,9 @@ def relit(capture: Capture) -> list[np.ndarray]:
     stale = [
         light for light, path in zip(LIGHTS, paths, strict=True) if not path.is_file() or path.stat().st_mtime < made
     ]
-    if stale:
-        subprocess.run(
-            [
-                sys.executable,
-                "-m",
-                "research.benchmarks.pictures.render_capture",
-                str(capture.root),
-                *stale,
-                "--resolution",
-                str(RESOLUTION),
-                "--samples",
-                str(SAMPLES),
-            ],
-            cwd=ROOT,
-            check=True,
-            stdout=subprocess.DEVNULL,
-        )
+    size = ("--resolution", RESOLUTION, "--samples", SAMPLES)
+    if stale and run_python("research.benchmarks.pictures.render_capture", capture.root, *stale, *size, quiet=True):
+        raise SystemExit("The renders failed.")
     return [images.linear_to_srgb(images.read_linear(path)) for path in paths]
 
 
@@ -138,5 +120,4 @@ def sheet(pictures: list[np.ndarray]) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     main()

@@ -17,9 +17,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ...people.blender_module import without_numpy_1
-from ..figures import command_line
+from ..figures import ROOT, command_line
 
-ROOT = Path(__file__).resolve().parents[3]
 EXTENSION = "bl_ext.user_default.wildcap"
 """The checkout's name in Blender, the very one that users get."""
 

@@ -13,7 +13,6 @@ No picture is made here of what is in the repository alone. teaser.jpg and galle
 --captures names a folder with sample.wildcap (as `make demo` leaves it) and NAME.wildcap
 (research/benchmarks/captures/people.py). Others are made by their page's benchmark (--picture, --pictures)."""
 
-import subprocess
 import sys
 from collections.abc import Iterator
 from importlib import import_module
@@ -49,7 +48,8 @@ def main() -> int:
         replace_text(path, text)
     for command in pictures(options.captures.resolve()) if options.captures else ():
         print(" ".join(command), flush=True)
-        subprocess.run([sys.executable, "-m", *command], cwd=ROOT, check=True)
+        if figures.run_python(*command):
+            return 1
     wrong = [*(wrong if options.check else ()), *strangers()]
     print(*wrong, sep="\n", end="\n" * bool(wrong), file=sys.stderr)
     return 1 if wrong else 0

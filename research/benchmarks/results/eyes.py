@@ -6,7 +6,7 @@ import numpy as np
 
 from ...people.lifelike.person import sample_person
 from ..captures.likenesses import LIKENESSES
-from ..figures import Figures, markdown
+from ..figures import Figures, markdown, number
 from ..head.open_eyes import ALONE, COLUMNS
 from ..pages import Sections, prose
 
@@ -48,7 +48,7 @@ def sections(record: Figures) -> Sections:
             "Eye by eye",
             markdown(
                 ["eye", *COLUMNS],
-                [[name, *(_shown(row[column]) for column in COLUMNS)] for name, row in {**fitted, **filmed}.items()],
+                [[name, *(number(row[column], 2) for column in COLUMNS)] for name, row in {**fitted, **filmed}.items()],
             ),
         ),
     ]
@@ -76,7 +76,3 @@ def _means(rows: dict) -> list[str | None]:
         values = [row[column] for row in rows.values() if row[column] is not None]
         told.append(f"{np.mean(values):.2f} ± {np.std(values, ddof=1):.2f}" if len(values) > 1 else None)
     return told
-
-
-def _shown(figure: float | None) -> str | None:
-    return None if figure is None else f"{figure:.2f}"

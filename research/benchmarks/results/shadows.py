@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/shadows.md: the mask that is proposed."""
 
-from ..figures import Figures, markdown
+from ..figures import Figures, markdown, number
 from ..pages import Sections, prose
 
 TITLE = "Shadow masks"
@@ -34,11 +34,7 @@ def sections(proposed: Figures) -> Sections:
                 markdown(
                     ["capture", "delighter", *SCORES.values()],
                     [
-                        [
-                            row.capture,
-                            row.delighter,
-                            *(None if row[key] is None else f"{row[key]:.2f}" for key in SCORES),
-                        ]
+                        [row.capture, row.delighter, *(number(row[key], 2) for key in SCORES)]
                         for row in proposed.rows.values()
                     ],
                 ),

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/upscale.md: four times as many texels."""
 
-from ..figures import Figures, markdown
+from ..figures import Figures, markdown, number
 from ..pages import Sections, prose
 
 TITLE = "Four times as many texels"
@@ -36,7 +36,10 @@ def sections(upscale: Figures, training: Figures, costs: Figures) -> Sections:
         """,
                 markdown(
                     ["reduced, enlarged by", *ENLARGED.values()],
-                    [[name, *(digits(key, row[key]) for key in ENLARGED)] for name, row in upscale.enlarging.items()],
+                    [
+                        [name, *(number(row[key], 2 if key.endswith(("psnr", "degrees")) else 3) for key in ENLARGED)]
+                        for name, row in upscale.enlarging.items()
+                    ],
                 ),
                 f"""
         ![Small map, Lanczos, network and truth: a mole, a scar's line, and two brows](../pictures/upscale.jpg)
@@ -83,8 +86,3 @@ def sections(upscale: Figures, training: Figures, costs: Figures) -> Sections:
         """),
         ),
     ]
-
-
-def digits(key: str, figure: float | None) -> str | None:
-    """As many decimals as the measure deserves."""
-    return None if figure is None else f"{figure:.{2 if key.endswith(('psnr', 'degrees')) else 3}f}"
