@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The inventory of every name that is persisted or addressed from outside: what saved captures, .blend files, batches,
-scripts and render farms rely on.
+"""Take the inventory of names that captures, .blend files, batches, scripts and render farms rely on.
 
     python -m research.benchmarks.inventory [--out tests/inventory.json]
 
@@ -37,7 +36,7 @@ def main() -> None:
 
 
 def take_inventory() -> dict:
-    """Return every name, by what it is a name of; lists are in order of name where their order means nothing."""
+    """Return every name, by what it is a name of; lists are sorted where their order means nothing."""
     addon = [ast.parse(path.read_text(encoding="utf-8")) for path in sorted((ROOT / "wildcap_addon").rglob("*.py"))]
     return {
         "stages": {stage.name: [*stage.reads, "->", *stage.writes] for stage in stages.STAGES},
@@ -62,7 +61,7 @@ def _describe(field) -> str:
 
 
 def _figures() -> list[str]:
-    """Return the names that stages and tools leave in capture.json, where they are written as text."""
+    """Return the names of the figures that stages and tools write, where they are literals."""
     calls = (
         node
         for path in (ROOT / "core").rglob("*.py")
@@ -75,7 +74,7 @@ def _figures() -> list[str]:
 
 
 def _commands(parser: argparse.ArgumentParser, name: str = "core") -> dict[str, list[str]]:
-    """Command -> its options and positional arguments."""
+    """Return command -> its options and positional arguments."""
     found = {name: []}
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
@@ -87,7 +86,7 @@ def _commands(parser: argparse.ArgumentParser, name: str = "core") -> dict[str, 
 
 
 def _classes(trees: list[ast.Module]) -> dict[str, list[str]]:
-    """Blender class -> its identifier, if it gives one, and its properties."""
+    """Return Blender class -> its identifier, if it gives one, and its properties."""
     found = {}
     for node in (node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ClassDef)):
         if not re.match("WILDCAP_[A-Z]{2}_", node.name):

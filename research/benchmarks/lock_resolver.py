@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which wheels a platform and a Python need: the direct requirements and all that they need in turn, as the package
-index has them.
+"""Resolve the wheels that a platform and a Python need, by the package index.
 
 pip chooses among versions and wheels. It judges the conditions of a requirement ("only on Windows") for the Python that
 it runs in, so it is asked without dependencies, and the conditions are judged here.
@@ -40,8 +39,7 @@ class Wheel:
 
 
 def resolve(name: str, direct: list[str], cuda: bool = False) -> dict[str, Wheel]:
-    """Package -> wheel for the lock `name`, with PyTorch's CUDA libraries or without. Raises Problem where a package is
-    not to be had."""
+    """Return package -> wheel for the lock `name`, with or without CUDA libraries. Raises Problem if one is missing."""
     environment, extras = environment_of(name), {}
     wanted = {locks.normal(Requirement(text).name): {text} for text in direct}
     while True:
@@ -64,13 +62,12 @@ def resolve(name: str, direct: list[str], cuda: bool = False) -> dict[str, Wheel
 
 
 def is_cuda(wheel: Wheel, need: Requirement) -> bool:
-    """PyTorch asks for CUDA's libraries by the condition platform_system == "Linux" alone."""
+    """Return True for PyTorch's CUDA libraries, whose condition is platform_system == "Linux" alone."""
     return wheel.name == "torch" and need.marker is not None and '"Linux"' in str(need.marker)
 
 
 def ask(name: str, packages: list[str], *more: str) -> dict[str, Wheel]:
-    """Return the wheels that pip chooses for a lock's platform and Python, without what they need in turn. Raises
-    Problem where one is not to be had."""
+    """Return the wheels that pip chooses for a lock, without dependencies. Raises Problem if one is missing."""
     with tempfile.TemporaryDirectory(prefix="wildcap_lock_") as folder:
         report = Path(folder) / "report.json"
         command = [
@@ -113,7 +110,7 @@ def ask(name: str, packages: list[str], *more: str) -> dict[str, Wheel]:
 
 
 def environment_of(name: str) -> dict[str, str]:
-    """Return what a requirement's conditions are judged by (PEP 508)."""
+    """Return the environment that a requirement's conditions are judged by (PEP 508)."""
     platform, _, python = name.rpartition("-")
     system, short, machine, kind = {
         "win_amd64": ("Windows", "win32", "AMD64", "nt"),
@@ -137,8 +134,10 @@ def environment_of(name: str) -> dict[str, str]:
 
 
 def wheel_files(url: str) -> tuple[int, list[tuple[str, int]]]:
-    """Bytes to download of a wheel at an address, and its files with their bytes unpacked: a wheel's own directory, at
-    its end, says them. Raises Problem when it is not there, or the server gives no parts of it."""
+    """Return the bytes to download of a wheel, and its files with their bytes unpacked, from its own directory.
+
+    Raises Problem if the server does not answer, or gives no parts of a file.
+    """
     try:
         tail, total = _part(url, -END.size)
         *_, size, offset, _ = END.unpack(tail)
@@ -151,7 +150,7 @@ def wheel_files(url: str) -> tuple[int, list[tuple[str, int]]]:
 
 
 def _part(url: str, offset: int, size: int | None = None) -> tuple[bytes, int]:
-    """`size` bytes of a file from `offset` (the last ones where it is negative), and the whole file's size."""
+    """Return `size` bytes of a file from `offset` (negative: the last ones), and the whole file's size."""
     parts = urllib.parse.urlsplit(url)
     if parts.scheme == "file":
         path = Path(urllib.request.url2pathname(parts.path))
@@ -168,7 +167,7 @@ def _part(url: str, offset: int, size: int | None = None) -> tuple[bytes, int]:
 
 
 def _listed(directory: bytes) -> list[tuple[str, int]]:
-    """Name and bytes unpacked of the files in a zip file's central directory (PKWARE APPNOTE 4.3.12)."""
+    """Return name and bytes unpacked of the files in a zip's central directory (PKWARE APPNOTE 4.3.12)."""
     files, at = [], 0
     while directory[at : at + 4] == b"PK\1\2":
         size, name_length, *more = struct.unpack_from("<L3H", directory, at + 24)

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""People with open eyes in a few frames with true cameras, and their heads half a millimetre off: what judges how eyes
-are found apart from how heads are.
+"""Photograph people with open eyes by true cameras, with heads half a millimetre off, to judge the eyes apart.
 
     python -m research.benchmarks.captures.eye_captures FOLDER [--only SEED ...] [--facekit FOLDER]
 

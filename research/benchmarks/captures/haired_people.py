@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Photographs of people whose every hair is known: frames through a phone's pipeline, and the maps that their true
-albedo gives."""
+"""Photographs of people whose every hair is known, and the maps that their true albedo gives."""
 
 from pathlib import Path
 
@@ -55,7 +54,7 @@ def photograph(folder: Path, figure: Figure) -> tuple[list[View], list[np.ndarra
 
 
 def _look(world: Scene, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """Linear albedo and unit normals (of hair: the head's behind it) [H, W, 3]; 0 beside the person."""
+    """Return linear albedo and unit normals (behind hair the head's) [H, W, 3]; 0 beside the person."""
     face, bary, _ = raster.render_view(world.whole, view, OVER)
     hit = face >= 0
     colour = np.zeros((*hit.shape, 3), np.float32)
@@ -67,8 +66,7 @@ def _look(world: Scene, view: View) -> tuple[np.ndarray, np.ndarray]:
 
 
 def read_maps(figure: Figure, views: list[View], colours: list[np.ndarray]) -> tuple[HeadMaps, PartsShown]:
-    """Return the texture that the true albedo of the views makes, as maps (what none of them sees has the bare skin's),
-    and what the parser says of the views."""
+    """Return the maps of the views' true albedo, with bare skin where no view sees, and the parser's parts."""
     surface = Head(figure.head).unfold(SIZE)
     total, weights = np.zeros((SIZE, SIZE, 3)), np.zeros((SIZE, SIZE, 1))
     looks = [observe(view, hold(colour), surface, 1.0) for view, colour in zip(views, colours, strict=True)]

@@ -115,8 +115,7 @@ def _write_record(target: Path, figure: Figure, light: scene.SceneLight) -> None
 
 
 def uv_parts(figure: Figure) -> dict[str, np.ndarray]:
-    """Return where each part is on the head's own map, [S, S] in [0, 1]: the growths as dense as they root, eyes as the
-    lids cover them, skin is the face's rest."""
+    """Return the density of each part on the head's map, [S, S] in [0, 1]; skin is the rest of the face."""
     parts = {name: template.mask(name, 1024) for name in ("lips", "eyes", "skin")}
     parts |= {name: images.resize(where, 1024, 1024) for name, where in figure.growth.items()}
     for name in figure.growth:

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Four people with eyes, hair and clothes, filmed whole, and two further lights for them and for the six bald people of
-research/benchmarks/captures/people.py.
+"""Film four people with eyes, hair and clothes, and photograph them and the six bald people in two further lights.
 
     python -m research.benchmarks.captures.likenesses FOLDER [--only NAME ...] [--lights own overcast below] [--facekit
         FOLDER]
@@ -33,8 +32,7 @@ from .people_lights import FURTHER, KINDS
 
 @dataclass(frozen=True)
 class Likeness:
-    """name: what the rule of its choice says; light: one of people_lights.KINDS, in which the person is filmed
-    whole."""
+    """One person: the name tells the rule by which the seed was chosen; the light is a key of people_lights.KINDS."""
 
     name: str
     seed: int
@@ -105,7 +103,7 @@ def film_likeness(person: Likeness, folder: Path, lights: list[str], facekit: Pa
 
 
 def photograph_again(person: people.FilmedPerson, folder: Path, light: str) -> None:
-    """A bald person in another light, as research/benchmarks/captures/people.py does it."""
+    """Photograph a bald person in another light."""
     kind = LIGHTS[light] if LIGHTS[light] != person.light else OTHERWISE
     began = time.monotonic()
     people.make(people.FilmedPerson(f"{person.name}_{light}", person.seed, kind), folder)

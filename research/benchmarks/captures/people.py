@@ -41,8 +41,7 @@ from .truth_files import Faces, exposure, true_frames, write_cameras, write_fram
 
 @dataclass(frozen=True)
 class FilmedPerson:
-    """name: the group of skin tone (research/benchmarks/delighting/delight_measures.py) and the capture's name; light:
-    one of people_lights.KINDS or FURTHER."""
+    """One person: the name is the group of skin tone; the light is a key of people_lights.KINDS or FURTHER."""
 
     name: str
     seed: int

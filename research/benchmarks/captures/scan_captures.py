@@ -130,8 +130,11 @@ def face_of(data: Path, head: Mesh) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LitScan:
-    """The scan ready for rays; opaque: it with all that throws shadows; its albedo [S, S, 3], linear; facial [V] in [0,
-    1], how far a vertex is facial skin; sun [3]: unit direction to it, None where there is none."""
+    """The scan ready for rays.
+
+    opaque: with all that throws shadows; albedo: linear [S, S, 3]; facial [V] in [0, 1]: share of facial skin of each
+    vertex; sun [3]: unit direction to it, None without one.
+    """
 
     caster: raster.RayCaster
     opaque: raster.RayCaster

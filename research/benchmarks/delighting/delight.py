@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How well the delighters take the light out of photographs whose albedo is known, set by set, beside no delighting and
-the flat true tone.
+"""Compare delighters, no delighting and the flat true tone on photographs whose albedo is known, set by set.
 
     python -m research.benchmarks.delighting.delight [--data DIR] [--sets NAME ...] [--capture NAME=FOLDER ...]
         [--opendelight PATH] [--quick] [--json OUT]
@@ -193,8 +192,7 @@ def rows(chosen: Photographs, settings: Settings) -> list[str]:
 
 
 def predictions(row: str, chosen: Photographs, settings: Settings) -> Iterator[tuple[Photograph, np.ndarray | Problem]]:
-    """Return each photograph of a set with what a row takes for its albedo, sRGB [H, W, 3], or why it does not serve
-    it."""
+    """Yield each photograph with a row's albedo, sRGB [H, W, 3], or the problem that the delighter raised."""
     if row in ("none", FLAT):
         for photograph in chosen.photographs:
             yield (

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What research/benchmarks/delighting/delight.py measures on: photographs with a known albedo, single ones and those of
-a registered capture."""
+"""Photographs with a known albedo for research/benchmarks/delighting/delight.py: single ones and captures."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,8 +20,10 @@ from ..maps.albedo_score import AlbedoTruth, read_truth
 
 @dataclass(frozen=True)
 class Photograph:
-    """sRGB [H, W, 3] under some light, with its truth; group: what it is also averaged over; frame: its file's name
-    where it belongs to a capture."""
+    """A photograph, sRGB [H, W, 3], with its truth.
+
+    group: a further mean is taken over it; frame: the file's name if it belongs to a capture.
+    """
 
     name: str
     srgb: np.ndarray
@@ -40,10 +41,10 @@ class Photographs:
 
 
 def light_stage(folder: Path, every: int = 1) -> Photographs:
-    """align_image/PERSON/CAM/NNN.png with align_diffuse/PERSON_CAM.png and align_mask_face/PERSON_CAM.png; every n-th
-    light of each.
+    """Read a light stage's photographs, every n-th light of each camera.
 
-    Raises Problem where a picture's truth is missing, or there is no picture at all.
+    Files: align_image/PERSON/CAM/NNN.png, align_diffuse/PERSON_CAM.png, align_mask_face/PERSON_CAM.png. Raises Problem
+    if a picture lacks its truth, or there is none.
     """
     found = []
     for camera in sorted(path for path in folder.glob("align_image/*/*") if path.is_dir()):
@@ -99,8 +100,7 @@ def select_true_frames(truth: Path, capture: Capture, work: Path, every: int = 1
 
 
 def registered(truth: Path, work: Path) -> Capture:
-    """Return the capture of `truth`/capture.mp4 in the folder `work`, run until its head is registered; kept there for
-    the next time."""
+    """Return the capture of `truth`/capture.mp4, run once in the folder `work` until its head is registered."""
     capture = Capture(work / f"{truth.name}.wildcap")
     if not capture.head.is_file():
         # standard output is the benchmark's own

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a delighter of single photographs keeps the face and takes the light: features kept, agreement across lights,
-and the two slopes.
+"""Measure how far a delighter of single photographs keeps the face and takes the light.
 
     python -m research.benchmarks.delighting.photographs [--data DIR] [--delighter NAME] [--weights FILE] [--sets NAME
         ...] [--subjects N]
@@ -10,7 +9,8 @@ and the two slopes.
 Sets: faceolat (two people under twelve lights each, with their albedo and landmarks.json), lamps (DIR/near_ps_human1: a
 man with brows and a beard under seven lamps, ambient light subtracted; the merge of what each lamp lights stands for
 the truth), pairs (research/benchmarks/delighting/pairs.py, --subjects of each group of skin tone). Rows: the four
-references of research/benchmarks/measures/references.py, and the delighter."""
+references of research/benchmarks/measures/references.py, and the delighter.
+"""
 
 import importlib
 import json
@@ -77,8 +77,11 @@ WORDS = (
 
 @dataclass(frozen=True)
 class LightSeries:
-    """A person under several lights, the head held still. srgb: the pictures [H, W, 3]; albedo: the truth, linear [H,
-    W, 3]; landmarks [468, 2] in pixels; face bool [H, W]; lit: per picture the pixels bool [H, W] that count."""
+    """A still person under several lights.
+
+    srgb: pictures [H, W, 3]; albedo: the truth, linear [H, W, 3]; landmarks [468, 2] in pixels; face: bool [H, W]; lit:
+    per picture the pixels that count, bool [H, W].
+    """
 
     name: str
     srgb: list[np.ndarray]
@@ -149,7 +152,7 @@ def answer_photograph(srgb: np.ndarray, albedo: np.ndarray, lit: np.ndarray, del
 
 
 def of_sitters(sitters: Iterator[LightSeries], delighter: str) -> Scores:
-    """Answer -> person -> figures of COLUMNS."""
+    """Return answer -> person -> figures of COLUMNS."""
     scores: Scores = {}
     for sitter in sitters:
         given = [
@@ -202,7 +205,7 @@ def of_sitter(sitter: LightSeries, answers: list[np.ndarray]) -> dict[str, float
 
 
 def of_pairs(subjects: int, delighter: str) -> Scores:
-    """Answer -> group of skin tone -> the two slopes, means over the group."""
+    """Return answer -> group of skin tone -> the two slopes, means over the group."""
     found: dict[str, dict[str, dict[str, list[float]]]] = {}
     for pair in pairs(subjects_by_tone(subjects)):
         given = [
@@ -225,7 +228,7 @@ def of_pairs(subjects: int, delighter: str) -> Scores:
 
 
 def light_stage_sitters(data: Path) -> Iterator[LightSeries]:
-    """Return the people of DATA/faceolat. Raises Problem where it is not there."""
+    """Yield the people of DATA/faceolat. Raises Problem if it is not there."""
     folder = data / "faceolat"
     if not (folder / "landmarks.json").is_file():
         raise Problem(f"{folder} has no landmarks.json.", "Name the folder that holds faceolat with --data.")
@@ -244,8 +247,7 @@ def light_stage_sitters(data: Path) -> Iterator[LightSeries]:
 
 
 def lamp_sitters(data: Path) -> Iterator[LightSeries]:
-    """Return the man of DATA/near_ps_human1, brightened to a usual exposure. Raises Problem where he is not there or no
-    face is found."""
+    """Yield the man of DATA/near_ps_human1, brightened to a usual exposure. Raises Problem without a face."""
     folder = data / "near_ps_human1"
     paths = sorted(folder.glob("[0-9]*.png"))
     if not paths or not (folder / "ambient.png").is_file():

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The estimated skin tone of real people, with its deviation, and how far a white or black ground moves it.
+"""Estimate the skin tone of real people, with its deviation, and how far a white or black ground moves it.
 
     python -m research.benchmarks.delighting.real_tones DATA FOLDER [--only NAME ...] [--row after] [--json FILE]
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How well the automatic shadow mask finds the true shadow inside the face:
+"""Measure how well the automatic shadow mask finds the true shadow inside the face.
 
     python -m research.benchmarks.delighting.shadow_mask [--seeds N ...] [--capture CAPTURE TRUTH] [--delighters NAME
         ...] [--work FOLDER]
@@ -61,8 +61,11 @@ def main() -> None:
 
 
 def scores(proposed: np.ndarray, true: np.ndarray, judged: np.ndarray) -> tuple[float, ...]:
-    """Shares of the judged texels that are in shadow and masked, intersection over union, precision, recall and the
-    F-score of the border at NEAR texels of a 1024 map, of masks bool [S, S] over texels bool [S, S]."""
+    """Compare masks, bool [S, S], over the judged texels, bool [S, S].
+
+    Returns the shares in shadow and masked, intersection over union, precision, recall, and the F-score of the border
+    at NEAR texels of a 1024 map.
+    """
     both = (proposed & true)[judged].sum()
     reach = NEAR * len(proposed) / 1024
     borders = [

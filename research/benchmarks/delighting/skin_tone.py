@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How true the estimated skin tone is, for each of six groups of skin, under random lights, exposures and white
-balances:
+"""Measure the estimated skin tone of six groups of skin under random lights, exposures and white balances.
 
     python -m research.benchmarks.delighting.skin_tone [--each 6] [--capture CAPTURE TONE.txt ...]
 
@@ -81,14 +80,17 @@ def expected(seed: int) -> str:
 
 
 def errors(tone: SkinTone, truth: np.ndarray) -> tuple[float, float, float]:
-    """Signed error of L*, delta E 2000, and the stated deviation of L*."""
+    """Return the signed error of L*, delta E 2000, and the stated deviation of L*."""
     found, true = to_lab(np.array(tone.linear)), to_lab(truth)
     return float(found[0] - true[0]), float(deltaE_ciede2000(true, found)), tone.deviation
 
 
 def summary(rows: dict[str, list], subjects: dict[str, int]) -> dict[str, dict]:
-    """Group (and "all") -> subjects, and row -> mean signed and root mean square error of L*, mean delta E 2000, mean
-    stated deviation of L* and the share within two of those."""
+    """Return group (and "all") -> subjects, and row -> figures.
+
+    Figures: mean signed and root mean square error of L*, mean delta E 2000, mean stated deviation of L*, and the share
+    within two of those.
+    """
     found: dict[str, dict] = {}
     for name in (*subjects, "all"):
         of_group = {"subjects": subjects.get(name, sum(subjects.values()))}
@@ -123,8 +125,7 @@ def print_table(rows: dict[str, list], subjects: dict[str, int]) -> None:
 
 
 def of_capture(capture: Capture, srgb: np.ndarray) -> dict:
-    """Return the true L* of a finished capture, and the estimate's error of L*, delta E and stated deviation, which are
-    printed."""
+    """Print and return the true L* of a finished capture, and the errors of the estimate."""
     truth, head = images.srgb_to_linear(srgb), read_head(capture)
     evidence = read_evidence(capture, head, TONE_SIDE_TEXELS)
     tone = estimate_skin_tone(capture, head, Settings(), evidence, Reporter("skin_tone"))

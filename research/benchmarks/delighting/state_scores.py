@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All measures of one capture, and of the captures of one person together, for
-research/benchmarks/delighting/state.py."""
+"""All measures of one capture, and of one person's captures together."""
 
 from itertools import combinations
 
@@ -27,12 +26,13 @@ Figures = dict[str, float | None]
 
 
 def in_pictures(answers: dict[str, np.ndarray], looks: list[HeadInView]) -> dict[str, Figures]:
-    """Method -> PSNR, SSIM and FLIP after one gain per channel, detail, and what is left along the shadow's edge, means
-    over the frames with a truth. answers: linear maps [S, S, 3], among them the filmed one, which tells where the light
-    steps.
+    """Return method -> figures in the picture, means over the frames with a truth.
 
-    Pixels count where the truth has facial skin and the head its face: the strands of a full beard stand before the
-    neck, and no map on a head without strands can show them there.
+    PSNR, SSIM and FLIP are after one gain per channel. answers: linear maps [S, S, 3], with the filmed one, which tells
+    where the light steps.
+
+    Pixels count where the truth has facial skin and the head its face: a beard's strands stand before the neck, and no
+    map on a head without strands can show them there.
     """
     found: dict[str, list[Figures]] = {method: [] for method in answers}
     face = np.repeat(template.mask("face", SIZE)[..., None], 3, axis=-1)
@@ -64,8 +64,7 @@ def in_pictures(answers: dict[str, np.ndarray], looks: list[HeadInView]) -> dict
 
 
 def in_uv(filmed: Filmed, maps: dict[str, np.ndarray]) -> dict[str, Figures]:
-    """Method -> the measures of one capture in UV space: PSNR up to a light of its own and that light's deviation,
-    contrast kept, parts. maps: linear [SIZE, SIZE, 3], the true one among them."""
+    """Return method -> figures of one capture in UV space, from linear maps [SIZE, SIZE, 3] with the true one."""
     where, points = filmed.where, landmarks_in_uv()
     truth, normals = maps[TRUE], filmed.normals[where]
     true_contrasts = contrasts(images.linear_to_srgb(truth), points, where)
@@ -89,9 +88,10 @@ def in_uv(filmed: Filmed, maps: dict[str, np.ndarray]) -> dict[str, Figures]:
 def of_person(
     captures: list[Filmed], maps: list[dict[str, np.ndarray]]
 ) -> tuple[dict[str, Figures], dict[str, Figures]]:
-    """Method -> what only the captures of one person together tell: PSNR up to their shared light, that light,
-    agreement, how features vary between lights, and the slope by light; and method -> capture -> PSNR up to the shared
-    light. A method counts the captures that have its answer; what needs two captures is None with one."""
+    """Return method -> figures of a person's captures together, and method -> capture -> PSNR up to shared light.
+
+    A method counts the captures that have its answer; what needs two captures is None with one.
+    """
     found, each_alone = {}, {}
     for method in dict.fromkeys(name for answers in maps for name in answers):
         chosen = [i for i, each in enumerate(maps) if method in each]
@@ -127,14 +127,14 @@ def of_person(
 
 
 def mean_of(rows: list[Figures]) -> Figures:
-    """Return the mean of each figure over the rows that have it; None where none does."""
+    """Return the mean of each figure over the rows that have it; None if none has."""
     return {
         name: _mean([row.get(name) for row in rows]) for name in dict.fromkeys(name for row in rows for name in row)
     }
 
 
 def small(answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Maps at SIZE."""
+    """Return maps at SIZE."""
     return {
         method: images.resize(np.ascontiguousarray(answer, np.float32), SIZE, SIZE)
         for method, answer in answers.items()

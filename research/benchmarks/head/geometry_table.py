@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What research.benchmarks.head.geometry found, as Markdown."""
+"""Markdown of the figures of research.benchmarks.head.geometry."""
 
 from ..figures import markdown, number
 
@@ -14,8 +14,7 @@ ROWS = {
 
 
 def table(figures: dict[str, dict]) -> str:
-    """Return the tables of {capture: figures of geometry.measure_capture}; what was not measured is a dash or is
-    said."""
+    """Return the tables of {capture: figures of geometry.measure_capture}; a dash was not measured."""
     results = figures
     tables = [_cameras(results), _surfaces(results), _textures(results), _costs(results)]
     stopped = [
@@ -33,8 +32,7 @@ def table(figures: dict[str, dict]) -> str:
 
 
 def published(results: dict[str, dict]) -> dict[str, dict]:
-    """Return what of the results goes into the record: all but the stages' own figures that no table shows, and
-    pictures."""
+    """Return the results for the record, without pictures and figures of stages that no table shows."""
     return {
         name: {
             part: {**of, "own": _millimetres(of["own"])} if isinstance(of, dict) and "own" in of else of

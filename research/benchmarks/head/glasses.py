@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How surely glasses are told: on rendered people whom nothing was learnt from, with and without drawn glasses, and the
-false alarms on real people without.
+"""Measure how surely glasses are found on rendered people, and the false alarms on real people without.
 
     python -m research.benchmarks.head.glasses [DATA] [--work FOLDER] [--hdri FOLDER] [--json PATH]
 
@@ -39,7 +38,7 @@ LONG_SIDE = 960
 
 
 def verdict(probabilities: list[float]) -> str:
-    """refused, warned or passed: what the stage frames does with a capture whose frames are so sure of glasses."""
+    """Return refused, warned or passed: the answer of the stage frames to such probabilities of glasses."""
     report = Reporter("frames")
     try:
         judge(probabilities, False, report)
@@ -49,7 +48,7 @@ def verdict(probabilities: list[float]) -> str:
 
 
 def look(srgb: np.ndarray) -> float:
-    """Return how surely a picture shows glasses; nan where no face is found or it is turned too far."""
+    """Return the sureness that a picture shows glasses; nan if no face is found or it is turned too far."""
     share = min(1.0, LONG_SIDE / max(srgb.shape[:2]))
     srgb = images.resize(srgb, round(srgb.shape[1] * share), round(srgb.shape[0] * share)) if share < 1 else srgb
     face = faces.detect(srgb)
@@ -57,7 +56,7 @@ def look(srgb: np.ndarray) -> float:
 
 
 def rendered(work: Path, hdri: Path | None) -> dict:
-    """Captures of the held-out figures, each all their views: what becomes of them, and single pictures, by kind."""
+    """Return the counts of the held-out figures' captures and pictures by kind of glasses."""
     people, panoramas = training.seeds(0)[1], read_panoramas(hdri)
     training.prepare(people, work, Reporter("glasses"))
     told: dict[str, list] = {kind: [] for kind in (*glasses.KINDS, "none")}
@@ -72,7 +71,7 @@ def rendered(work: Path, hdri: Path | None) -> dict:
 
 
 def counted(captures: list[list[float]]) -> dict:
-    """Of captures and of their single pictures: what becomes of them."""
+    """Return the verdicts of captures, and how surely their single pictures show glasses."""
     single = np.array([each for capture in captures for each in capture if np.isfinite(each)])
     ends = [verdict(capture) for capture in captures]
     return {
@@ -85,7 +84,7 @@ def counted(captures: list[list[float]]) -> dict:
 
 
 def real(data: Path) -> dict[str, list[list[np.ndarray]]]:
-    """Captures of real people without glasses by set, each a list of sRGB pictures."""
+    """Return captures of real people without glasses by set, each a list of sRGB pictures."""
     lamps = [
         images.read_srgb(path)
         for path in sorted((data / "near_ps_human1").glob("*.png"))
@@ -107,7 +106,7 @@ def read(folder: Path, pattern: str) -> Iterator[np.ndarray]:
 
 
 def filmed(video: Path) -> list[np.ndarray]:
-    """FILMED frames of a film, evenly spread."""
+    """Return FILMED frames of a film, evenly spread."""
     frames = list(read_film(video))
     return [frames[k].astype(np.float32) / 255 for k in np.linspace(0, len(frames) - 1, FILMED).astype(int)]
 

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that is grown from pictures of people whose every hair is known: where it covers the face, and which way it
-lies.
+"""Compare hair grown from pictures with the known hair of people: where it covers the face, and its direction.
 
     python -m research.benchmarks.head.groomed FOLDER [--seeds 3 ...] [--trust] [--sheet docs/pictures/hair.jpg]
                                  [--json research/records/groomed.json]
@@ -14,7 +13,8 @@ Amount: what both cover of a pixel's surroundings of 3 mm, over what either does
 Beside both what the true hairs score when they are sown anew, with other roots and the same rule: where pictures show
 no single hairs, no growth can know more. Parser: texels to which it gives more than half, against those where hair
 grows. Direction: each true hair against the nearest grown one within 3 mm, from root to tip, on the skin; beside it
-what the usual directions alone give. FOLDER keeps the pictures."""
+what the usual directions alone give. FOLDER keeps the pictures.
+"""
 
 from pathlib import Path
 
@@ -117,7 +117,7 @@ def main() -> None:
 
 
 def to_table(rows: dict[str, dict]) -> str:
-    """Markdown: a line for each part of each person."""
+    """Return Markdown: a line for each part of each person."""
     lines = [
         [
             name,
@@ -158,7 +158,7 @@ def to_table(rows: dict[str, dict]) -> str:
 
 
 def shortfalls(rows: dict[str, dict]) -> str:
-    """Return which rows miss what is wanted, and how often following the strokes is worth it."""
+    """Return the rows that miss the goals, and how often following the strokes is worth it."""
     told = [(f"the {name} person's {part}", row) for name, parts in rows.items() for part, row in parts.items()]
     known = [row for _, row in told if "degrees" in row]
     thin = [f"{what} ({row['iou']:.2f})" for what, row in told if row["iou"] < WANTED_IOU]
@@ -217,8 +217,7 @@ def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
 
 
 def try_trusts(folder: Path, seed: int) -> list[list]:
-    """For each part of a person: degrees by which the found directions are off the true hairs' in the median, for each
-    of TRUSTS, the mean over TURNS."""
+    """Return for each part of a person the median error of directions in degrees for each of TRUSTS."""
     figure = make_figure(seed, SIZE)
     views, seen = photograph(folder / str(seed), figure)
     surface, (maps, shown) = lay_out(figure.head, SIZE), read_maps(figure, views, seen)
@@ -251,7 +250,7 @@ def _mean_mm(hairs: Strands) -> float:
 
 
 def _off(true: Strands, grown: Strands, figure: Figure) -> float:
-    """Median angle in degrees on the skin."""
+    """Return the median angle in degrees on the skin."""
     distance, nearest = cKDTree(grown.points[:, 0]).query(true.points[:, 0])
     close = distance < NEAR_MM / 1000
     normals = vertex_normals(figure.head)[cKDTree(figure.head.vertices).query(true.points[close, 0])[1]]
@@ -263,7 +262,7 @@ def _off(true: Strands, grown: Strands, figure: Figure) -> float:
 
 
 def _median_angle(directions: np.ndarray, true_directions: np.ndarray, normals: np.ndarray) -> float:
-    """Degrees between directions [N, 3] on the skin."""
+    """Return the median of the degrees between directions [N, 3] on the skin."""
     directions, true_directions = (
         way - (way * normals).sum(1, keepdims=True) * normals for way in (directions, true_directions)
     )
@@ -274,8 +273,7 @@ def _median_angle(directions: np.ndarray, true_directions: np.ndarray, normals: 
 
 
 def overlaps(figure: Figure, views: list[View], true: Strands | None, grown: Strands | None) -> tuple[float, float]:
-    """Of the views, the intersection over union of the pixels that hair covers, and the sum of the lesser of both
-    covers over that of the greater."""
+    """Return the intersection over union of covered pixels, and the sum of lesser over that of greater covers."""
     both = either = 0
     least = most = 0.0
     for view in views:
@@ -288,15 +286,14 @@ def overlaps(figure: Figure, views: list[View], true: Strands | None, grown: Str
 
 
 def sow_anew(figure: Figure, part: str) -> Strands:
-    """Return a person's hairs of a part as they would be with other roots."""
+    """Return a person's hairs of a part with other roots."""
     return SOWN[part](
         figure.person, ground_of(figure.head), SkinSurface(figure.head), np.random.default_rng([figure.person.seed, 99])
     )
 
 
 def _told(figure: Figure, parts_shown: PartsShown, part: str) -> float:
-    """Intersection over union of the texels to which the parser gives more than half and of those where such hair
-    grows, as far as a view shows them."""
+    """Return the intersection over union of the parser's texels (more than half) and those where such hair grows."""
     grows = (
         images.resize(figure.growth[part], SIZE, SIZE) > 0.25 if part in figure.growth else np.zeros((SIZE, SIZE), bool)
     )
@@ -305,7 +302,7 @@ def _told(figure: Figure, parts_shown: PartsShown, part: str) -> float:
 
 
 def _cover(figure: Figure, view: View, hairs: Strands | None) -> np.ndarray:
-    """Share of each pixel [H, W] that hair covers."""
+    """Return the share of each pixel [H, W] that hair covers."""
     skin = figure.opened.skin
     whole = joined([skin, prisms(hairs)]) if hairs is not None else skin
     face, _, _ = raster.render_view(raster.RayCaster(whole), view, OVER)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How well the face parser (core/face/parser.py) tells the parts of people that no training sees.
+"""Measure the face parser (core/face/parser.py) on people that no training sees.
 
     python -m research.benchmarks.head.parts [--json OUT.json] [--frames FOLDER] [--weights FILE]
     python -m research.benchmarks.head.parts --sheet OUT.jpg --pictures FOLDER_OR_FILE ... [--weights FILE]
@@ -95,7 +95,7 @@ def main() -> None:
 
 
 def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """VIEWS sRGB pictures of a person and their shares, [S, S, 3] and [S, S, len(PARTS)]."""
+    """Yield VIEWS sRGB pictures of a person and their shares, [S, S, 3] and [S, S, len(PARTS)]."""
     figure = make_figure(seed, TEXELS)
     scene = Scene(figure)
     for view in range(VIEWS):
@@ -104,7 +104,7 @@ def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 
 
 def filmed(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Return the frames with truth of a filmed person and their shares, each hair SPARSE times."""
+    """Yield the frames with truth of a filmed person and their shares, each hair SPARSE times."""
     names = sorted(path.stem for path in (folder / "parts" / "hair").glob("*.png"))
     for index, frame in enumerate(read_film(folder / "capture.mp4")):
         if f"{index:04d}" in names:
@@ -117,8 +117,7 @@ def filmed(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 def _crops(
     pictures: Iterator[tuple[np.ndarray, np.ndarray]], network: ParseNet
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Of each picture in which a face is found: the true parts, the network's, and where the crop shows the picture;
-    [SIDE, SIDE] each."""
+    """Yield for each picture with a face the true parts, the network's, and the picture's place, [SIDE, SIDE]."""
     for srgb, shares in pictures:
         face = faces.detect(srgb)
         if face is not None:
@@ -133,7 +132,7 @@ def usual_parts(crops: dict[str, list], name: str) -> np.ndarray:
 
 
 def row(crops: list[tuple[np.ndarray, np.ndarray, np.ndarray]], pictures: int) -> dict:
-    """Return the figures of some crops: (truth, found, known) each."""
+    """Return the figures of crops, (truth, found, known) each."""
     counted = np.zeros((len(PARTS), len(PARTS)), int)
     for truth, found, known in crops:
         np.add.at(counted, (truth[known], found[known]), 1)

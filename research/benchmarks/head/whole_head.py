@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The completed head and the hair's masks, in numbers.
+"""Measure the completed head and the hair's masks.
 
     python -m research.benchmarks.head.whole_head [--seeds 9101 9102 ...] [--size 512] [--json OUT.json] [CAPTURE ...]
 
@@ -73,7 +73,7 @@ def main() -> None:
 
 
 def whole(seed: int, surface: HeadSurface) -> dict:
-    """Return how near the hidden head comes to its truth."""
+    """Return the error of the hidden head."""
     size = surface.size
     truth, face = _painted(surface, seed), template.mask("face", size)
     skin = torch.from_numpy(np.ascontiguousarray(template.mask("skin", size)))
@@ -106,7 +106,7 @@ def whole(seed: int, surface: HeadSurface) -> dict:
 
 
 def hairs(seed: int, surface: HeadSurface) -> dict:
-    """Return how well hair is found and taken away; the subject three times: bearded, shaven, without brows."""
+    """Return the errors of finding and removing hair; the subject bearded, shaven, and without brows."""
     bearded, shaven, bare = (
         _painted(surface, seed, **changes)
         for changes in ({"beard": 0.8, "beard_length": 1.0}, {"beard": 0.0}, {"beard": 0.0, "brow_density": 0.0})
@@ -126,7 +126,7 @@ def hairs(seed: int, surface: HeadSurface) -> dict:
 
 
 def of_capture(capture: Capture, subject: int | None = None) -> dict:
-    """Return how far the border and the map's cut show, before and after, and how much hair there is."""
+    """Return how far the border and the map's cut show, before and after, and the area of hair."""
     maps = read_maps(capture.maps, capture.texture_confidence)
     surface = lay_out(read_head(capture).mesh, len(maps.diffuse))
     report = Reporter("upscale")
@@ -179,8 +179,7 @@ def _painted(surface: HeadSurface, seed: int, **changes) -> HeadMaps:
 
 
 def _step(maps: HeadMaps, ring: np.ndarray, next_ring: np.ndarray, surface: HeadSurface) -> float:
-    """Mean difference of the log tone (over 2 mm) between the texels of a ring and the nearest of another on the
-    surface."""
+    """Return the mean difference of log tone (over 2 mm) between a ring's texels and the nearest of another."""
     tone = np.log(_tone(maps, surface))
     _, nearest = cKDTree(surface.position[ring][::4]).query(surface.position[next_ring][::4], distance_upper_bound=25.0)
     met = nearest < len(surface.position[ring][::4])
@@ -194,8 +193,7 @@ def _tone(maps: HeadMaps, surface: HeadSurface) -> np.ndarray:
 
 
 def _cut(maps: HeadMaps, surface: HeadSurface) -> dict:
-    """Mean step of log albedo over the map's cut (less than 1 mm apart in space, far apart in the map), and between
-    neighbours along its edge."""
+    """Return the mean step of log albedo over the map's cut (less than 1 mm apart), and between neighbours."""
     edge = np.zeros(surface.covered.shape, bool)
     edge[[0, -1]] = edge[:, [0, -1]] = True
     light, at, place = np.log(np.maximum(maps.diffuse, 0.004)).mean(2), np.argwhere(edge), surface.position[edge]
@@ -221,7 +219,7 @@ def _darker(hairy: HeadMaps, bare: HeadMaps) -> np.ndarray:
 
 
 def _alike(cover: np.ndarray, true: np.ndarray) -> float:
-    """0 where nothing was found."""
+    """Return the correlation over the face; 0 if nothing was found."""
     face = template.mask("face", len(cover)) > 0.5
     return float(np.corrcoef(cover[face], true[face])[0, 1]) if cover[face].std() > 0 else 0.0
 

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an in-the-wild capture loses to a controlled one, and what the solve adds to a studio's even light: the same
-people, their true albedo known.
+"""Measure what an in-the-wild capture loses to a controlled one, and what the solve adds to even light.
 
     python -m research.benchmarks.light.controlled FOLDER [--only NAME ...] [--json OUT.json]
 
@@ -80,7 +79,7 @@ def main() -> int:
 
 
 def measure(folder: Path, name: str) -> dict[str, dict]:
-    """Row -> figures of one person; rows whose capture is missing are left out, with a line that says so."""
+    """Return row -> figures of one person; rows whose capture is missing are left out, and named."""
     wild, truth, kept = Capture(folder / f"{name}.wildcap"), folder / name, folder / "controlled" / name
     if not (truth / "skin_tone.txt").is_file():
         return {}
@@ -132,7 +131,7 @@ def measure(folder: Path, name: str) -> dict[str, dict]:
 
 
 def means(rows_of_people: dict[str, dict]) -> dict[str, dict]:
-    """Row -> figure -> mean over the people that have all rows of the same table."""
+    """Return row -> figure -> mean over the people that have all rows of the same table."""
     out = {}
     for table_rows in (GAP, STUDIO):
         people = whole(rows_of_people, table_rows)
@@ -149,12 +148,12 @@ def means(rows_of_people: dict[str, dict]) -> dict[str, dict]:
 
 
 def whole(rows_of_people: dict[str, dict], table_rows: dict) -> list[dict]:
-    """Return the people whose rows of one table are all there."""
+    """Return the people who have all rows of one table."""
     return [rows for rows in rows_of_people.values() if {*table_rows} <= {*rows}]
 
 
 def table(record: dict) -> str:
-    """Markdown: the means of the gap to a controlled capture and of the studio, then both per person."""
+    """Return Markdown: the means of both tables, then both per person."""
     mean, everyone = record["mean"], {**record["people"], "mean": record["mean"]}
     parts = []
     for rows in (GAP, STUDIO):
@@ -226,8 +225,7 @@ def table(record: dict) -> str:
 
 
 def _set(folder: Path, name: str, place: str) -> Capture:
-    """Return the person's capture at a place. Raises Problem where its head is not the wild capture's, in whose frames
-    all is scored."""
+    """Return the person's capture at a place. Raises Problem if its head is not the wild capture's."""
     capture = Capture(folder / f"{name}_{place}.wildcap")
     if capture.head.read_bytes() != (folder / f"{name}.wildcap" / "head.obj").read_bytes():
         raise Problem(

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of its albedo skin gives back under even light in Cycles: a sphere as large as a head, of six tones, without
-gloss.
+"""Render spheres of six skin tones under even light in Cycles, and measure how much of the albedo comes back.
 
     python -m research.benchmarks.light.even_light [--json OUT.json]
 

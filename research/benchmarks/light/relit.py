@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Solved heads under new light beside the true subjects under the same light: the number that artists feel.
+"""Compare solved heads under new light with the true subjects under the same light.
 
     python -m research.benchmarks.light.relit WORK [--sample CAPTURE] [--people FOLDER [--only NAME ...]] [--picture
     docs/pictures/relit.jpg] [--json OUT.json]
@@ -19,7 +19,8 @@ lights:
 
 The true maps are worn where the registered surface lies on the true head (research/benchmarks/light/relit_maps.py). All
 albedos share the truth's mean over confident facial skin. WORK keeps the renders; those that are newer than the maps
-and textures are taken as they are."""
+and textures are taken as they are.
+"""
 
 import argparse
 import sys
@@ -120,8 +121,7 @@ def main() -> int:
 
 @dataclass(frozen=True)
 class RelitSubject:
-    """name; capture, solved; maps: the folder of the true ones; truth: where cameras.json lies; seed: whose head it
-    is."""
+    """A solved capture, the folder of the true maps, the folder with cameras.json, and the seed of the head."""
 
     name: str
     capture: Capture
@@ -154,9 +154,7 @@ def _subjects(arguments: argparse.Namespace, work: Path) -> Iterator[RelitSubjec
 
 
 def render_rows(subject: RelitSubject, work: Path, lights: list[str], row_names: list[str]) -> None:
-    """Render the pictures that are not newer than what they show.
-
-    subject: with maps of its own and the true ones; row_names: of the rows, besides the truth."""
+    """Render the truth and rows, unless the pictures are newer than what they show."""
     capture, truth = subject.capture, subject.maps
     renders, mask = work / "renders", work / "mask.png"
     renders.mkdir(parents=True, exist_ok=True)
@@ -196,8 +194,7 @@ def render_rows(subject: RelitSubject, work: Path, lights: list[str], row_names:
 
 
 def is_newer(picture: Path, capture: Capture, truth: Path) -> bool:
-    """Return whether a render is there and was made after all that it shows: the capture's maps, its textures and head,
-    and the true maps."""
+    """Return True if a render was made after the capture's maps, textures and head, and the true maps."""
     shown = [
         path for folder in (capture.maps, capture.maps_4k, truth) if folder.is_dir() for path in folder.glob("*.png")
     ]
@@ -206,7 +203,7 @@ def is_newer(picture: Path, capture: Capture, truth: Path) -> bool:
 
 
 def score(work: Path, lights: list[str], rows: list[str] = ROWS) -> dict[str, dict[str, dict]]:
-    """Light -> row -> PSNR, SSIM and FLIP over the face; and pictures of SHOWN side by side, work/LIGHT.png."""
+    """Return light -> row -> PSNR, SSIM and FLIP over the face, and write SHOWN side by side to work/LIGHT.png."""
     face = images.read_data(work / "renders" / "face.exr")[..., 0] > 0.5
     box, seen, found = face_box(face), rendered(face), {}
     for light in lights:
@@ -223,14 +220,12 @@ def score(work: Path, lights: list[str], rows: list[str] = ROWS) -> dict[str, di
 
 
 def exposure(truth: np.ndarray, face: np.ndarray) -> float:
-    """Return the gain that brings the mean luminance of a linear picture [H, W, 3] over the pixels `face` bool [H, W]
-    to MIDDLE."""
+    """Return the gain that brings the mean luminance of a linear picture [H, W, 3] over the face to MIDDLE."""
     return MIDDLE / float((truth[face] @ LUMINANCE).mean())
 
 
 def rendered(face: np.ndarray) -> tuple[slice, slice]:
-    """Rows and columns of the rectangle about the face, bool [H, W], that is rendered
-    (research/benchmarks/light/relit_renders.py)."""
+    """Return rows and columns of the rendered rectangle about the face, bool [H, W]."""
     margin = int(MARGIN * len(face)) - 1
     return tuple(
         slice(max(side[0] - margin, 0), side[-1] + margin)
@@ -239,14 +234,14 @@ def rendered(face: np.ndarray) -> tuple[slice, slice]:
 
 
 def side_by_side(pictures: list[np.ndarray]) -> np.ndarray:
-    """Pictures of one size in two columns, sRGB [H, W, 3]; an odd one out is followed by black."""
+    """Return pictures of one size in two columns, sRGB [H, W, 3]."""
     half = (len(pictures) + 1) // 2
     columns = pictures + [np.zeros_like(pictures[0])] * (2 * half - len(pictures))
     return np.hstack([np.vstack(columns[:half]), np.vstack(columns[half:])])
 
 
 def mean_over_lights(figures_by_light: dict[str, dict[str, dict]]) -> dict[str, dict[str, float]]:
-    """Row -> figures, each the mean over the lights."""
+    """Return row -> figures, each the mean over the lights."""
     rows = next(iter(figures_by_light.values()))
     return {
         row: {
@@ -258,7 +253,7 @@ def mean_over_lights(figures_by_light: dict[str, dict[str, dict]]) -> dict[str, 
 
 
 def shortfall(rows: dict[str, dict[str, float]]) -> str:
-    """Return what is missing to what is asked for, in words; empty where nothing is."""
+    """Return the gains that miss the goal, in words; '' if none does."""
     gains = {row: rows["solved"]["psnr"] - rows[row]["psnr"] for row in ("raw", "delit")}
     return ", ".join(
         f"{gains[row]:+.2f} dB over {row} where {asked:.1f} is asked for"
@@ -268,7 +263,7 @@ def shortfall(rows: dict[str, dict[str, float]]) -> str:
 
 
 def with_mean(results: dict[str, dict[str, dict[str, float]]]) -> dict[str, dict[str, dict[str, float]]]:
-    """Return the same and, where there are several people of research/benchmarks/captures/people.py, their mean."""
+    """Return the results and, if there are several of PEOPLE, their mean."""
     people = [results[person.name] for person in PEOPLE if person.name in results]
     if len(people) < 2:
         return dict(results)
@@ -280,8 +275,7 @@ def with_mean(results: dict[str, dict[str, dict[str, float]]]) -> dict[str, dict
 
 
 def table(results: dict[str, dict[str, dict[str, float]]]) -> str:
-    """Markdown: a line per row, and for each subject PSNR, SSIM and FLIP; last the mean over the people of
-    research/benchmarks/captures/people.py."""
+    """Return Markdown: a line per row with PSNR, SSIM and FLIP of each subject, and the mean over PEOPLE."""
     columns, people = with_mean(results), sum(person.name in results for person in PEOPLE)
     return figures.markdown(
         ["row", *(f"mean of {people}" if name == "mean" else name.replace("_", " ") for name in columns)],

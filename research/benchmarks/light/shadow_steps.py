@@ -1,15 +1,16 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of a shadow a delighter leaves: the steps along M's border, as the solver sees them and as they are.
+"""Measure how much of a shadow a delighter leaves: steps along M's border, as seen by the solver and as they are.
 
     python -m research.benchmarks.light.shadow_steps FOLDER [--only PREFIX ...] [--truths FOLDER] [--json PATH]
 
-FOLDER holds captures with a texture, a proposed mask and a truth, as research/benchmarks/state.py reads them. In
-natural log, inside of M less outside, at the places of its border: what the delighter took out; what the solver sees,
-its texture over the mean face in its global light, in which skin's own steps are; and what is left of the light in
-truth, texture over true albedo. The last one's deviation is what core/solver/extensions/border.py calls LEFT: beside it
-stand that of all other people, the share of the steps that the solver takes for light by these, and the best share, the
-slope of the true steps on those that it sees."""
+FOLDER holds captures with a texture, a proposed mask and a truth, as research/benchmarks/delighting/state.py reads
+them. Steps are in natural log, inside of M less outside, at the places of its border: what the delighter took out; what
+the solver sees, its texture over the mean face in its global light, with skin's own steps; and what is left of the
+light in truth, texture over true albedo. The last one's deviation is LEFT in core/solver/extensions/border.py. Beside
+it stand that of all other people, the share of the steps that the solver takes for light by these, and the best share,
+the slope of the true steps on the seen ones.
+"""
 
 import sys
 
@@ -54,8 +55,7 @@ def main() -> int:
 
 
 def measure(filmed: Filmed) -> dict:
-    """Mean and deviation of each kind of step along M's border, and the slope of the true ones on those that are
-    seen."""
+    """Return mean and deviation of each kind of step along M's border, and the slope of true on seen ones."""
     capture = filmed.capture
     evidence = read_evidence(capture, read_filmed_head(capture), REFERENCE_TEXELS)
     tone = read_given_tone(people.skin_tone(filmed.truth))
@@ -94,7 +94,7 @@ def measure(filmed: Filmed) -> dict:
 
 
 def table(rows: dict[str, dict]) -> str:
-    """The rows in Markdown."""
+    """Return Markdown of the rows."""
     return figures.markdown(
         HEAD,
         [

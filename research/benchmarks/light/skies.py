@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What environments are like, and how often a face's skin tells of them: the prior of core/light/sunlight.py.
+"""Measure the statistics of environments and facial skin behind the prior of core/light/sunlight.py.
 
     python -m research.benchmarks.light.skies FOLDER
 
@@ -44,14 +44,14 @@ def main() -> int:
 
 
 def harmonic_shares(panorama: np.ndarray) -> np.ndarray:
-    """Orthonormal coefficients [9] of a panorama's luminance [H, W, 3], as shares of the first."""
+    """Return the coefficients [9] of a panorama's luminance [H, W, 3], as shares of the first."""
     size = panorama.shape[:2]
     coefficients = np.einsum("ijk,ij->k", sh_basis(panorama_directions(*size)), panorama.mean(-1) * solid_angles(*size))
     return coefficients / coefficients[0]
 
 
 def summarise_skies(shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and standard deviation [9] of environments [N, 9] that may be turned about the vertical by any angle."""
+    """Return mean and deviation [9] of environments [N, 9] that may be turned about the vertical."""
     mean, square = np.zeros(9), (shares**2).mean(0)
     for pair in PAIRS:
         square[list(pair)] = square[list(pair)].mean()
@@ -61,8 +61,10 @@ def summarise_skies(shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def count_independent(points: np.ndarray, weights: np.ndarray, reach: float) -> float:
-    """As how many independent samples points [V, 3] with weights [V] count whose values are correlated by
-    exp(-distance / reach)."""
+    """Return the number of independent samples among points [V, 3] with weights [V].
+
+    Their values are correlated by exp(-distance / reach).
+    """
     known = np.flatnonzero(weights > 0)
     known = known[:: max(1, len(known) // POINTS)]
     points, weights = points[known], weights[known]

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each part of the solver is worth, on UV-space problems with known truth
-(research/benchmarks/maps/uv_problems.py): subjects that no training saw.
+"""Measure what each part of the solver is worth, on UV-space problems with known truth that no training saw.
 
     python -m research.benchmarks.maps.ablation OUT.json [--rows NAME ...] [--subjects NAME ...] [--skins FOLDER]
         [--kind raw|delit]
@@ -14,7 +13,8 @@ what a tie is; the other rows run on one shadow per subject, the 600 steps of th
 problem each; every row is compared with the full method on its own problems only. OUT.json keeps every finished solve,
 so the command goes on where it was stopped. --skins names a folder of skins carried into our UVs (`python -m
 research.training carry`); those in the prior's card under held_out_skins are added to the subjects. The picture is of
-synthetic subjects only."""
+synthetic subjects only.
+"""
 
 import argparse
 import json
@@ -128,7 +128,7 @@ def main() -> None:
 
 
 def solve_all(options: argparse.Namespace, done: dict) -> None:
-    """Fill `done` with the solves that are missing and stores it after each problem."""
+    """Solve what is missing in `done`, and store it after each problem."""
     subjects = [*options.subjects, *(_held_out(options.skins) if options.skins else [])]
     tasks = []
     for i, subject in enumerate(subjects):
@@ -151,8 +151,10 @@ def solve_all(options: argparse.Namespace, done: dict) -> None:
 
 
 def _belongs(row: str, subject: int, shadows: int, seed: int) -> bool:
-    """Return whether a row is solved on a problem: key rows on all, others on one shadow per subject, the 600 steps on
-    one problem each; two seeds of the first."""
+    """Return True if a row is solved on a problem.
+
+    Key rows run on all, others on one shadow per subject, the 600 steps on one problem each; the first has two seeds.
+    """
     if seed and row != FULL:
         return False
     if row in NAMED:
@@ -184,9 +186,7 @@ def _solve_problem(subject: str, shadows: str, solves: list[tuple[str, int]], op
 
 
 def solve_row(uv_problem: MaskedUvProblem, row: str, seed: int, steps: int) -> np.ndarray:
-    """Solve a problem by one row's method, which is told the true skin tone.
-
-    steps: of every row that does not say otherwise. Returns the albedo, linear [S, S, 3]."""
+    """Solve a problem by one row's method with the true skin tone; linear albedo [S, S, 3]."""
     if row == "the texture itself":
         return uv_problem.texture
     changes, cells, mask, with_prior = ROWS[row]
@@ -227,11 +227,11 @@ def solve_problem(
 def fit_texels(
     start: Start, recipe: Recipe, updates: int = 600, fit: Callable[..., None] = update_lights, smooth: float = 0.0
 ) -> State:
-    """No prior: the albedo's texels and the lights follow the photometric loss alone, under Adam (the paper's
-    ablation).
+    """Fit the albedo's texels and the lights to the photometric loss alone, under Adam (the paper's ablation).
 
-    start: begun from; its state changes, and is returned; recipe: of the lights; its phases last as long as the fit;
-    smooth: weight of the albedo's L1 variation."""
+    start: its state changes, and is returned; recipe: its phases last as long as the fit; smooth: weight of the
+    albedo's L1 variation.
+    """
     recipe = replace(
         recipe, phases=tuple((which, 0.0, 1.0) for which, _, _ in recipe.phases), refit=0.0, updates=updates
     )
@@ -253,8 +253,7 @@ def fit_texels(
 
 
 def tone_error(uv_problem: MaskedUvProblem, tone: tuple[float, float, float], steps: int) -> tuple[float, float]:
-    """CIEDE2000 between a requested skin tone (sRGB) and the mean of the solved facial skin: as it is delivered, and
-    before the mean is brought to the request."""
+    """Return CIEDE2000 between a requested tone (sRGB) and the solved skin's mean, as delivered and as sampled."""
     skin, found, asked = skin_weight(len(uv_problem.albedo)), [], SkinTone.from_srgb(tone, GIVEN)
     for rescale in (OURS.rescale, "none"):
         albedo = solve_problem(uv_problem, replace(OURS, steps=steps, rescale=rescale), asked)
@@ -264,7 +263,7 @@ def tone_error(uv_problem: MaskedUvProblem, tone: tuple[float, float, float], st
 
 
 def draw(options: argparse.Namespace) -> None:
-    """Of two synthetic subjects the texture, the rows PICTURED and the truth."""
+    """Draw the texture, the rows PICTURED and the truth of two synthetic subjects."""
     lines = []
     for subject, shadows in (("9007", "leaves, hard"), ("9008", "edge, half soft")):
         given = make_problem(subject, shadows, options.size, options.kind)

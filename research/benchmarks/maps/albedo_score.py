@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Solved albedo against true albedo, in image space, on facial skin (the paper's protocol for Digital Emily).
+"""Score the solved albedo against the true one in the picture, on facial skin (the paper's protocol).
 
     python -m research.benchmarks.maps.albedo_score CAPTURE TRUTH [--json OUT.json]
 
@@ -40,8 +40,7 @@ LABELS = {"WildCap": "**WildCap**", "raw video": "the raw video", "flat true ton
 
 @dataclass(frozen=True)
 class AlbedoTruth:
-    """One frame's truth: albedo sRGB [H, W, 3], facial skin bool [H, W], and where the sun does not reach, bool [H, W]
-    or None."""
+    """One frame's truth: sRGB albedo [H, W, 3], facial skin and, if known, shadow, bool [H, W]."""
 
     frame: int
     albedo: np.ndarray
@@ -50,7 +49,7 @@ class AlbedoTruth:
 
 
 def read_truth(folder: Path) -> list[AlbedoTruth]:
-    """Return the frames of a truth folder. Raises Problem when there are none."""
+    """Return the frames of a truth folder. Raises Problem if there are none."""
     frames = []
     for path in sorted((folder / "albedo").glob("*.png")):
         shadow = folder / "shadow" / path.name
@@ -69,8 +68,7 @@ def read_truth(folder: Path) -> list[AlbedoTruth]:
 
 @dataclass(frozen=True)
 class HeadInView:
-    """What a view with truth sees of a head: hit bool [H, W], and for each pixel that hits where on the map it lies,
-    [N, 2], u and v."""
+    """A view with truth: hit, bool [H, W], where it shows the head, and uv [N, 2] of these pixels."""
 
     true: AlbedoTruth
     hit: np.ndarray
@@ -100,8 +98,10 @@ def averaged(albedo: np.ndarray) -> np.ndarray:
 
 
 def looks(capture: Capture, truth: Path) -> tuple[list[HeadInView], list[int]]:
-    """Return the registered frames with truth as they see the capture's head, and the numbers of those that were not
-    registered. Raises Problem where none was."""
+    """Return the registered frames with truth as they see the head, and the numbers of the others.
+
+    Raises Problem if none was registered.
+    """
     whole = read_head(capture)
     head, caster = whole.mesh, whole.caster
     frames = read_frames(capture).by_name
@@ -141,7 +141,7 @@ def score_floors(truth: Path) -> dict:
 
 
 def compare(predicted: np.ndarray, true: AlbedoTruth, mask: np.ndarray) -> dict:
-    """One frame's figures: predicted albedo sRGB [H, W, 3] against the truth over the pixels of `mask`."""
+    """Return one frame's figures of a predicted albedo, sRGB [H, W, 3], over the pixels of `mask`."""
     box = face_box(mask)
     predicted, mask = predicted[box], mask[box]
     true = AlbedoTruth(true.frame, true.albedo[box], true.face[box], None if true.shadow is None else true.shadow[box])
@@ -168,8 +168,7 @@ def mean_scores(results: list[dict]) -> dict:
 
 
 def rows(scores: dict[str, dict]) -> dict[str, dict]:
-    """Row -> PSNR in dB as it is and after the gain, SSIM, FLIP, detail and shadow step, of what `score_capture` and
-    `score_floors` give."""
+    """Return row -> figures of a table, from `score_capture` and `score_floors`."""
     return {
         name: {
             "psnr": score["raw"]["psnr"],
@@ -184,7 +183,7 @@ def rows(scores: dict[str, dict]) -> dict[str, dict]:
 
 
 def table(figures: dict) -> str:
-    """Markdown of figures["rows"], as `rows` gives them."""
+    """Return Markdown of figures["rows"], as `rows` gives them."""
     return markdown(
         ["taken for albedo", "PSNR", "after one gain", "SSIM", "FLIP", "detail", "shadow step"],
         [

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Albedo against truth, the paper's protocol for Digital Emily: our light beside other methods' light models, on delit
-and on raw frames.
+"""Compare our light with other methods' light models, on delit and raw frames (the paper's protocol).
 
     python -m research.benchmarks.maps.comparison FOLDER [--only NAME ...] [--scan CAPTURE TRUTH] [--size 512] [--jobs
         2] [--json OUT.json]
@@ -16,7 +15,8 @@ its folder. Rows of INPUT: METHOD over one texture:
   texture                  taken for albedo as it is
 All but the last three sample the same prior with the same guidance; all are told the true skin tone. Raw rows get the
 mask that the chain proposes for raw frames. Maps are kept in FOLDER/comparison (research/benchmarks/maps/rerender.py
-reads them), so that a second run goes on where the first stopped."""
+reads them), so that a second run goes on where the first stopped.
+"""
 
 import json
 import shutil
@@ -132,7 +132,7 @@ def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[st
 
 
 def find_row_folder(work: Path, input_name: str, method: str, seed: int = 0) -> Path:
-    """Return where a row's diffuse_albedo.exr, shading.exr and score.json lie."""
+    """Return the folder of a row's diffuse_albedo.exr, shading.exr and score.json."""
     return work / f"{input_name}_{method.replace(', ', '_').replace(' ', '_')}_{seed}"
 
 
@@ -197,8 +197,7 @@ def _keep(row: Path, diffuse: np.ndarray, shading: np.ndarray, seconds: float, l
 
 
 def _raw(source: Capture, folder: Path, settings: Settings) -> Capture:
-    """Return a copy of a capture whose texture is the frames' as filmed, with the mask that the chain proposes for it;
-    made once."""
+    """Return a copy of a capture with the texture as filmed and the mask proposed for it; made once."""
     copy = Capture(folder)
     if not copy.shadow_mask_auto.is_file():
         shutil.rmtree(folder, ignore_errors=True)

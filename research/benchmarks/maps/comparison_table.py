@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tables of research/benchmarks/maps/comparison.py: means over the subjects, and ours less each other method,
-person by person."""
+"""The tables of research/benchmarks/maps/comparison.py."""
 
 import numpy as np
 
@@ -28,8 +27,7 @@ FORMATS = {
 
 
 def means(subjects: list[dict]) -> dict:
-    """Of several subjects' figures: input -> method -> column -> mean of the first seed; and 'spread': half of what two
-    seeds of ours differ by."""
+    """Return input -> method -> column -> mean over subjects, and "spread", half the difference of two seeds."""
     out: dict = {
         given: {
             method: {
@@ -49,8 +47,7 @@ def means(subjects: list[dict]) -> dict:
 
 
 def table(record: dict) -> str:
-    """Markdown: a line per row with the means over the people, of each input's rows the best of each column and what
-    ties with it in bold; then the scan's."""
+    """Return Markdown: a line per row with means over people, best and ties in bold for each input; then the scan's."""
     parts = []
     for key, title in (("people", "mean of the people"), ("scan", "head scan")):
         if key not in record:
@@ -77,8 +74,10 @@ DIFFERENCES = {
 
 
 def paired(subjects: dict[str, dict]) -> dict:
-    """Ours less each other method, person by person: input -> method -> column of DIFFERENCES -> mean and the standard
-    error of the mean. subjects: name -> what comparison.compare_methods found."""
+    """Return ours less each other method: input -> method -> column -> mean and its standard error.
+
+    subjects: name -> figures of comparison.compare_methods.
+    """
 
     def differences(given: str, method: str, about: str, figure: str) -> tuple[float, float]:
         gains = [
@@ -99,8 +98,7 @@ def paired(subjects: dict[str, dict]) -> dict:
 
 
 def paired_table(subjects: dict[str, dict]) -> str:
-    """Markdown of `paired`: bold where ours is better by more than two standard errors, italic where worse by more
-    than one."""
+    """Return Markdown of `paired`: bold if better by two standard errors, italic if worse by one."""
     lines = []
     for given, methods in paired(subjects).items():
         for method, found in methods.items():

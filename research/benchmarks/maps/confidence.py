@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the confidence of the solved albedo is an uncertainty, on people with a known albedo, and what the four
-deviations of core/stages/solve/confidence.py are.
+"""Judge the confidence of the solved albedo as an uncertainty, and fit the deviations of stages/solve/confidence.py.
 
     python -m research.benchmarks.maps.confidence FOLDER [--truths FOLDER] [--only PREFIX ...] [--json
     research/records/confidence.json]
@@ -10,7 +9,8 @@ FOLDER holds captures as research/benchmarks/delighting/state.py measures them, 
 of the solved map to the true one at one tone, over the texels of the face that were seen well. The deviations are the
 most likely ones for normal errors, each capture's own size of error left free; the row *left out* takes for each person
 those of all others. The size itself, which no row of the likelihood needs, is the median over captures. Only figures
-are written."""
+are written.
+"""
 
 import sys
 from collections.abc import Iterable
@@ -52,8 +52,7 @@ FEW = 4000
 
 @dataclass(frozen=True)
 class Errors:
-    """Of one capture: error [N], variances [N, 4] of `confidence.variances`, blurred [N]: the deviation of the error
-    about a texel, which nobody could know."""
+    """One capture's errors [N], their `confidence.variances` [N, 4], and the deviation of the error nearby [N]."""
 
     person: str
     error: np.ndarray
@@ -91,7 +90,7 @@ def read_errors(filmed: Filmed) -> Errors:
 
 
 def measure(captures: dict[str, Errors]) -> dict:
-    """Return the table's scores, the captures' rows, and the deviations that all of them make most likely."""
+    """Return the table's scores, the captures' rows, and the most likely deviations."""
     shipped = np.array([getattr(confidence, name) for name in DEVIATIONS])
     people = sorted({each.person for each in captures.values()})
     others = (
@@ -128,7 +127,7 @@ def measure(captures: dict[str, Errors]) -> dict:
 
 
 def fit_deviations(captures: Iterable[Errors]) -> np.ndarray:
-    """[4]: the most likely deviations, in natural log."""
+    """Return the most likely deviations [4], in natural log."""
     rng, chosen = np.random.default_rng(0), []
     for each in captures:
         some = rng.choice(len(each.error), min(FEW, len(each.error)), replace=False)
@@ -151,9 +150,11 @@ def fit_deviations(captures: Iterable[Errors]) -> np.ndarray:
 
 
 def judge(error: np.ndarray, sigma: np.ndarray) -> dict[str, float]:
-    """Likelihood gained over the best constant and coverage, both by the factor of sigma that is best for the capture;
-    coverage without it; Spearman's correlation with the size of the error; the mean error of the half with the smaller
-    sigma over that of the other."""
+    """Return the figures of COLUMNS for errors and their sigmas.
+
+    Gain and coverage use the best factor of sigma for the capture, coverage_absolute none; half: mean error of the half
+    with the smaller sigma over that of the other.
+    """
     found = calibrate(error, sigma * np.sqrt(np.mean((error / sigma) ** 2)))
     size, order = np.abs(error), np.argsort(sigma, kind="stable")
     sure, rest = order[: len(order) // 2], order[len(order) // 2 :]
@@ -167,7 +168,7 @@ def judge(error: np.ndarray, sigma: np.ndarray) -> dict[str, float]:
 
 
 def sections(record: dict) -> Sections:
-    """Heading and Markdown of each part of the page."""
+    """Return heading and Markdown of each part of the page."""
     found, people = summarise(record["people"], COLUMNS), len(record["people"][SHIPPED])
     plain = confidence.PLAIN_DEVIATION
     words = prose(f"""

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of a person's own marks a texture keeps: moles one by one (freckles and dots of stubble among them), pores
-by their band.
+"""Measure how much of a person's marks a texture keeps: moles, freckles and stubble one by one, pores by their band.
 
 Both are measured against true albedo frames, in the picture, on the logarithm of linear green, so no tone or gain
 counts. The texture is rendered with several rays per pixel, as the truth was: one ray would count aliasing for or
@@ -72,18 +71,16 @@ def cast_face_rays(caster: raster.RayCaster, view: View, true: AlbedoTruth, marg
 
 
 def centre_rays(rays: FaceRays, texture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the map sRGB [S, S, 3] by one ray per pixel, as albedo_score renders it: sRGB [h, w, 3] and the pixels
-    that hit."""
+    """Return a map sRGB [S, S, 3] seen by one ray per pixel: sRGB [h, w, 3], and the pixels that hit."""
     at, hit = (x[RAYS // 2 :: RAYS, RAYS // 2 :: RAYS] for x in (rays.at, rays.hit))
     return raster.sample(texture, at.reshape(-1, 2) * len(texture)).reshape(*hit.shape, 3) * hit[..., None], hit
 
 
 def marks(rays: FaceRays, texture: np.ndarray) -> dict | None:
-    """Figures of one frame for a texture sRGB [S, S, 3] in the head's UVs.
+    """Return the figures of one frame for a texture, sRGB [S, S, 3] in the head's UVs; None without skin to judge.
 
-    mole_contrast: regression of the rendered moles on the true ones, 1 keeps their depth and place, 0 lost them all;
-    moles: how many; pore_contrast: ratio of deviations in the band; pore_correlation. None where nothing is left to
-    judge.
+    mole_contrast: regression of the rendered moles on the true ones, 1 keeps their depth and place; moles: their
+    number; pore_contrast: ratio of deviations in the band; pore_correlation.
     """
     colours = raster.sample(images.srgb_to_linear(texture), rays.at.reshape(-1, 2) * len(texture))
     linear = colours.reshape(*rays.hit.shape, 3) * rays.hit[..., None]
@@ -106,7 +103,7 @@ def marks(rays: FaceRays, texture: np.ndarray) -> dict | None:
 
 
 def moles(band: np.ndarray, inner: np.ndarray) -> list[tuple[int, int]]:
-    """Rows and columns of dark, roundish minima of a band-passed picture [h, w] inside a mask, deepest first."""
+    """Return rows and columns of dark, roundish minima of a band-passed picture [h, w] in a mask, deepest first."""
     lowest = (band <= cv2.erode(band, np.ones((7, 7)))) & inner & (band < -MOLE_DEPTH)
     smooth = cv2.GaussianBlur(band, (0, 0), 1)
     xx, yy, xy = (cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((2, 0), (0, 2), (1, 1)))
@@ -119,7 +116,7 @@ def moles(band: np.ndarray, inner: np.ndarray) -> list[tuple[int, int]]:
 
 
 def mean_of(frames: list[dict | None]) -> dict:
-    """Means over frames; frames without moles say nothing about them."""
+    """Return means over frames; frames without moles do not count for them."""
     found = [f for f in frames if f]
     if not found:
         return {}

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a trained prior knows: samples beside what it was trained on, and how well normals and specular follow from the
-diffuse.
+"""Measure a trained prior: samples beside the training skins, and normals and specular given the diffuse.
 
     python -m research.benchmarks.maps.prior_figures samples OUT.png --work DIR [--skins FOLDER] [--weights FILE]
     python -m research.benchmarks.maps.prior_figures response [--subjects 9000 9001 ...] [--size 512] [--weights FILE]
@@ -237,7 +236,7 @@ def sample_given_diffuse(
 
 
 def errors(maps: torch.Tensor, truth: torch.Tensor, face: torch.Tensor) -> tuple[float, float]:
-    """RMS angle of normals in degrees, and RMSE of specular, over the face."""
+    """Return the RMS angle of normals in degrees, and the RMSE of specular, over the face."""
     unit = torch.nn.functional.normalize(maps[3:6], dim=0)
     cosine = (unit * torch.nn.functional.normalize(truth[3:6], dim=0)).sum(0)[face].clamp(-1, 1)
     degrees = torch.rad2deg(torch.arccos(cosine))

@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Face reconstruction, the paper's table 1: albedo times shading in the views that were solved from, against the delit
-frames, on facial skin.
+"""Compare albedo times shading with the delit frames on facial skin (the paper's table 1).
 
     python -m research.benchmarks.maps.rerender FOLDER [--only NAME ...] [--json OUT.json]
 
 FOLDER was made by research/benchmarks/captures/people.py and compared by research/benchmarks/maps/comparison.py, whose
 delit rows are taken. Each view has a gain per channel of its own (delighters and cameras expose each frame anew), the
 same way for every row. The ceiling is the texture itself in the same views: where they disagree with each other no
-albedo and no shading can explain them all."""
+albedo and no shading can explain them all.
+"""
 
 import json
 from dataclasses import dataclass
@@ -41,8 +41,7 @@ FORMATS = {"psnr": "{:.2f} dB", "ssim": "{:.4f}", "flip": "{:.4f}", "features": 
 
 @dataclass(frozen=True)
 class DelitFrame:
-    """A delit frame, sRGB [H, W, 3], and how the head looks from there; `look.true.face` is the facial skin that is
-    judged."""
+    """A delit frame, sRGB [H, W, 3], and the head seen from there; `look.true.face` is the judged facial skin."""
 
     picture: np.ndarray
     look: HeadInView
@@ -96,15 +95,13 @@ def delit_views(capture: Capture) -> list[DelitFrame]:
 
 
 def rendering(work: Path, row: str) -> np.ndarray:
-    """Albedo times shading of a delit row, linear [S, S, 3]; the ceiling's is the texture that all rows were solved
-    from."""
+    """Return albedo times shading of a delit row, linear [S, S, 3]; the ceiling's is the texture itself."""
     folder = find_row_folder(work, "delit", "texture" if row == CEILING else row)
     return images.read_linear(folder / "diffuse_albedo.exr") * images.read_linear(folder / "shading.exr")
 
 
 def score(rendered: np.ndarray, views: list[DelitFrame]) -> dict[str, float]:
-    """PSNR, SSIM, FLIP and, where its network is installed, the feature distance of a map [S, S, 3] (linear) to the
-    delit frames, each the mean over views."""
+    """Return the figures of a linear map [S, S, 3] against the delit frames, means over views."""
     found = []
     for view in views:
         mask = view.look.true.face
@@ -123,7 +120,7 @@ def score(rendered: np.ndarray, views: list[DelitFrame]) -> dict[str, float]:
 
 
 def table(record: dict) -> str:
-    """Markdown: a line per row with the mean over the people, beside the paper's figures for its own captures."""
+    """Return Markdown: a line per row with means over people, beside the paper's figures for its own captures."""
     known = [figure for figure in FORMATS if figure in record["mean"][OURS]]
     lines = []
     for row, cells in record["mean"].items():

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skin or light: what the split of a texture's large shapes (core/solver/extensions/split.py) is worth, alone and under
-the solve, and what it takes for granted.
+"""Measure what the split of skin and light (core/solver/extensions/split.py) is worth, alone and under the solve.
 
     python -m research.benchmarks.maps.split FOLDER [--truths FOLDER] [--only PREFIX ...] [--beside NAME=FOLDER ...]
         [--json PATH]
@@ -12,7 +11,8 @@ FOLDER holds captures as research/benchmarks/delighting/state.py measures them, 
 The closed form alone is a second of work: the texture over the global light that it finds, of each capture alone and of
 all captures of a person together; and with the scales' prior halved and doubled. --beside names folders with the same
 captures solved in another way (an earlier solver, `core run --with`). Likenesses stay where they are; only figures are
-written."""
+written.
+"""
 
 import sys
 from dataclasses import asdict
@@ -124,8 +124,7 @@ def sections(record: dict) -> Sections:
 
 
 def measure(captures: list[Filmed], beside: dict[str, Path]) -> tuple[Scores, dict, dict]:
-    """Method -> person -> figures; capture -> method -> PSNR up to the shared light; capture -> scales, of the capture
-    alone."""
+    """Return method -> person -> figures, capture -> method -> PSNR up to the shared light, and capture -> scales."""
     scores: Scores = {}
     by_capture, scales = {}, {}
     for person in dict.fromkeys(filmed.person for filmed in captures):
@@ -163,7 +162,7 @@ prior = cache(load)
 
 
 def shapes_of(filmed: Filmed) -> split.Shapes:
-    """Return what the solver would split of a capture, with the true tone."""
+    """Return the input of the solver's split for a capture, with the true tone."""
     evidence = read_evidence(filmed.capture, read_filmed_head(filmed.capture), SIZE)
     tone = read_given_tone(people.skin_tone(filmed.truth))
     if tone is None:
@@ -180,9 +179,11 @@ def divided(shapes: split.Shapes, fitted: split.Split, local: bool) -> np.ndarra
 
 
 def parts_side_by_side(filmed: Filmed) -> np.ndarray:
-    """As filmed, delit, mean face, that with traits, global light about a middle grey; local light, the texture over
-    the global light, solved, true, and the deviation of the error that is expected, black to DOUBTFUL: sRGB, at the
-    truth's tone."""
+    """Return the parts of a capture side by side, sRGB, at the truth's tone.
+
+    Above: as filmed, delit, mean face, that with traits, global light about a middle grey. Below: local light, the
+    texture over the global light, solved, true, and the expected deviation, black to DOUBTFUL.
+    """
     shapes = shapes_of(filmed)
     found = split.split_captures([shapes], make_head_cells)
     maps = small(

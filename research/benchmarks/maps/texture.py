@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Geometry and texture alone: textures of the true albedo frames, taken for the albedo, against those same frames.
+"""Score textures of the true albedo frames against those frames: geometry and texture alone.
 
 CAPTURE is registered (cameras, head.obj); TRUTH is laid out as research/benchmarks/maps/albedo_score.py says. Its
 albedo frames go through the `folder` delighter, V = those. `measure_rows` gives, per row, the score of albedo_score and
@@ -65,7 +65,7 @@ def measure_rows(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS) ->
 
 
 def looks_of(capture: Capture, caster: raster.RayCaster, truth: Path) -> dict[str, FaceRays]:
-    """Frame name -> what its rays meet, of the registered frames with a true albedo."""
+    """Return frame name -> its rays' hits, of the registered frames with a true albedo."""
     frames = read_frames(capture).by_name
     known = {true.frame: true for true in read_truth(truth)}
     found = {
@@ -102,8 +102,7 @@ def _texture(row: str, observations: list, surface) -> np.ndarray:
 
 
 def score(map_: np.ndarray, frames: Iterable[FaceRays]) -> dict:
-    """albedo_score's figures of a map, sRGB [S, S, 3], and those of research/benchmarks/maps/detail.py, means over the
-    frames."""
+    """Return the figures of a map, sRGB [S, S, 3], by albedo_score and detail, means over the frames."""
     scores, found = [], []
     for seen in frames:
         predicted, hit = centre_rays(seen, map_)

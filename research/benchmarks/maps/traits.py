@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the split of skin and light takes traits for (core/solver/extensions/split.py), measured on skins of other
-people: how far they differ, where, over which distances, and how alike a face's two sides are.
+"""Measure how skins of other people differ: how far, where, over which distances, and between a face's sides.
 
     python -m research.benchmarks.maps.traits SKINS [--json research/records/traits.json]
 
 SKINS is what `python -m research.training carry` made of another head's skins; one of each cluster counts. What light
 is painted into a family of skins cannot be told from its traits, so both extremes are measured: all of it taken for
 traits, and all of it that the light of a sky explains (research/training/skins.py) taken out. z is a skin's difference
-from the others' median over the deviation that those others have there: one skin is left out at a time."""
+from the others' median over the deviation that those others have there: one skin is left out at a time.
+"""
 
 import sys
 from dataclasses import replace
@@ -49,7 +49,7 @@ def main() -> int:
 
 
 def measure(found: LargeShapes) -> dict:
-    """Of one way to take the light: deviation, correlations by distance, and z-scores."""
+    """Return deviation, correlations by distance, and z-scores, with the light taken in one way."""
     rng = np.random.default_rng(0)
     i, j = rng.integers(0, len(found.places), (2, PAIRS))
     one, other = found.places[i], found.places[j]
@@ -74,7 +74,7 @@ def measure(found: LargeShapes) -> dict:
 
 
 def z_scores(found: LargeShapes) -> np.ndarray:
-    """[N, K]: each skin's difference from the median of the others, over their deviation at that place."""
+    """Return each skin's difference from the median of the others, over their deviation there, [N, K]."""
     scores = []
     for k in range(len(found.ratio)):
         rest = np.delete(found.ratio, k, 0)
@@ -94,7 +94,7 @@ def correlation_by_distance(product: np.ndarray, apart_mm: np.ndarray) -> dict[s
 
 
 def regions(places: np.ndarray) -> dict[str, np.ndarray]:
-    """Name -> bool [N] of places [N, 3] on the built-in head: five regions of the facial skin."""
+    """Return name -> bool [N] of places [N, 3] on the built-in head: five regions of the facial skin."""
     height = template.landmark_points(template.load())[:, 2]
     x, z = np.abs(places[:, 0]), places[:, 2]
     nose_base = (height[NOSE_TIP] + height[MOUTH]) / 2

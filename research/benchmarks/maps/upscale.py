@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Four times as many texels of a side: the network against Lanczos on subjects that no training saw, and what the
-frames add.
+"""Compare the upscaling network with Lanczos on subjects that no training saw, and measure what the frames add.
 
     python -m research.benchmarks.maps.upscale [--work DIR] [--json FILE]
                                  [--picture docs/pictures/upscale.jpg]
@@ -91,7 +90,7 @@ def main() -> None:
 
 
 def enlarging(work: Path, sheet: Path | None = None) -> dict[str, dict[str, float]]:
-    """Figures per kind of reduction and method, each the mean over the subjects' windows."""
+    """Return figures per kind of reduction and method, means over the subjects' windows."""
     prepare(list(SEEDS), VIEWS, work, Reporter("upscale"), 1)
     found, shots = {}, []
     for kind, how in KINDS.items():
@@ -116,7 +115,7 @@ def enlarging(work: Path, sheet: Path | None = None) -> dict[str, dict[str, floa
 
 
 def compare(result: np.ndarray, true: np.ndarray) -> dict[str, float]:
-    """Figures of enlarged maps [H, W, 7] (sRGB diffuse, unit normal, specular) against true ones."""
+    """Return the figures of enlarged maps [H, W, 7] (sRGB diffuse, unit normal, specular) against true ones."""
     result, true = (maps[BORDER:-BORDER, BORDER:-BORDER] for maps in (result, true))
     figures = {}
     for name, channels in (("diffuse", slice(0, 3)), ("specular", slice(6, 7)), ("normal", slice(3, 6))):
@@ -139,7 +138,7 @@ def compare(result: np.ndarray, true: np.ndarray) -> dict[str, float]:
 
 
 def cost(method: str, size: int = 1024) -> dict[str, float]:
-    """Seconds and peak memory in GiB of enlarging maps of that size, in the process it is called in."""
+    """Return seconds and peak memory in GiB of enlarging maps of that size, in this process."""
     rng, blank = np.random.default_rng(0), np.ones((size, size, 3), np.float32)
     maps = HeadMaps(
         rng.random((size, size, 3), np.float32),
@@ -156,7 +155,7 @@ def cost(method: str, size: int = 1024) -> dict[str, float]:
 
 
 def _enlarged(small: np.ndarray, method: str) -> np.ndarray:
-    """Maps [7, H, W] in the network's channels, four times as large: [4H, 4W, 7]."""
+    """Return maps [7, H, W] in the network's channels, four times as large: [4H, 4W, 7]."""
     diffuse, normal = images.srgb_to_linear(np.moveaxis(small[:3], 0, -1)), np.moveaxis(small[3:6], 0, -1)
     blank = np.ones_like(diffuse)
     maps = HeadMaps(diffuse, normal, small[6], blank[..., 0], blank, blank[..., 0])
@@ -164,8 +163,7 @@ def _enlarged(small: np.ndarray, method: str) -> np.ndarray:
 
 
 def _closeup(small: np.ndarray, results: dict[str, np.ndarray], true: np.ndarray, side: int = 176) -> np.ndarray:
-    """Return the small map, each method and the truth side by side, diffuse above normals, where the truth has most
-    detail."""
+    """Return small map, methods and truth side by side, diffuse above normals, where the truth has most detail."""
     log = cv2.GaussianBlur(np.abs(cv2.Laplacian(true[..., 1], cv2.CV_32F)), (0, 0), side / 4)[side:-side, side:-side]
     row, column = (int(at) + side // 2 for at in np.unravel_index(log.argmax(), log.shape))
     nearest = np.repeat(np.repeat(np.moveaxis(small, 0, -1), FACTOR, 0), FACTOR, 1)
@@ -177,7 +175,7 @@ def _closeup(small: np.ndarray, results: dict[str, np.ndarray], true: np.ndarray
 
 
 def from_frames(work: Path) -> dict[str, dict[str, float]]:
-    """Figures of each method without and with the frames' own detail, means over the subjects."""
+    """Return the figures of each method without and with the frames' own detail, means over the subjects."""
     rows: dict[str, list] = {}
     for seed in FILMED:
         capture, true = filmed(seed, work / f"filmed_{seed}.wildcap")
@@ -198,8 +196,7 @@ def from_frames(work: Path) -> dict[str, dict[str, float]]:
 
 
 def filmed(seed: int, folder: Path) -> tuple[Capture, np.ndarray]:
-    """Return a capture of a reserved subject in even light, with its texture made, and its true albedo, sRGB [2048,
-    2048, 3]. Made once."""
+    """Return a reserved subject's capture in even light with its texture, and its albedo, sRGB [2048, 2048, 3]."""
     capture = Capture(folder)
     if not (capture.root / "truth.png").is_file():
         mesh, rng = subject_mesh(seed), np.random.default_rng([seed, 50])
@@ -217,8 +214,7 @@ def filmed(seed: int, folder: Path) -> tuple[Capture, np.ndarray]:
 
 
 def _stacked(srgb: np.ndarray) -> np.ndarray:
-    """Return the network's channels of an albedo at 2048 on smooth skin, at 4096, of which a solver's map is a quarter:
-    [7, 4096, 4096]."""
+    """Return the network's channels [7, 4096, 4096] of an albedo at 2048 on smooth skin."""
     maps = np.zeros((CHANNELS, 4096, 4096), np.float32)
     maps[:3] = srgb.repeat(2, 0).repeat(2, 1).transpose(2, 0, 1)
     maps[5], maps[6] = 1, 0.35

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Close-ups of the six people of research/benchmarks/captures/people.py by the add-on's own buttons: what
-hair_closeups.py and eyes_closeups.py share.
+"""Close-ups of the six people of research/benchmarks/captures/people.py by the add-on's own buttons.
 
 Maps and heads are the true ones, so the pictures show what hair, eyes and mouth do and nothing of a solve's errors.
 Cycles's linear light under the sRGB curve (Blender's view transform Standard).
@@ -25,9 +24,11 @@ EEVEE_SAMPLES = 32
 
 @dataclass(frozen=True)
 class CloseUp:
-    """What a picture shows: opened: how far the eyes are open; units: face units and their values; at: one of SEAMS,
-    `above_m` metres above it, seen from `away_m` metres away on the side `way` [3] in the head's axes through a lens of
-    `lens_mm`."""
+    """The content of a picture.
+
+    opened: how far the eyes are open; units: face units and their values; at: one of SEAMS, `above_m` metres above it,
+    seen from `away_m` metres away on the side `way` [3] in the head's axes through a lens of `lens_mm`.
+    """
 
     light: str
     at: str
@@ -47,10 +48,10 @@ Shots = Callable[[str], dict[str, CloseUp]]
 
 
 def run_closeups(module: str, description: str, shots: Shots, resolution: int, samples: int) -> None:
-    """The command that a module of close-ups is: a row of pictures for each person.
+    """Run the command of a module of close-ups: a row of pictures for each person.
 
-    shots: name of a person -> name of a picture -> what it shows; resolution: pixels of a side, where the command
-    does not say."""
+    shots: name of a person -> name of a picture -> its content; resolution: default pixels of a side.
+    """
     parser = command_line(__doc__)
     parser.add_argument("folder", type=Path, help="keeps captures and renders; finished renders are taken as they are")
     parser.add_argument("out", type=Path)
@@ -81,8 +82,7 @@ def run_closeups(module: str, description: str, shots: Shots, resolution: int, s
 
 
 def prepare(folder: Path, name: str, seed: int) -> Path:
-    """Return a capture with the true head and maps, and what the stage 4K Maps finds of its hair, made if it is not
-    there."""
+    """Return a capture with the true head and maps, and with its hair found by the stage 4K Maps; made once."""
     from core.capture.capture import Capture
     from core.capture.messages import Reporter
     from core.face import template

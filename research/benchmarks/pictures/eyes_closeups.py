@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Close-ups of Close-Up Eyes on six tones of skin, under three lights and in both engines, by the add-on's own buttons:
+"""Draw Close-Up Eyes on six tones of skin, under three lights and in both engines, by the add-on's own buttons.
 
     python -m research.benchmarks.pictures.eyes_closeups FOLDER docs/pictures/eyes_closeups.jpg [--resolution 192]
         [--samples 16]
@@ -33,7 +33,7 @@ FACES = {
 
 
 def shots(name: str) -> dict[str, CloseUp]:
-    """Picture -> what it shows."""
+    """Return the pictures of a person by name."""
     number = [person.name for person in PEOPLE].index(name)
     light, iris = LIGHTS[number % len(LIGHTS)], IRISES[number]
     return {

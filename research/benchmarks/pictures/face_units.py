@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guide's picture of face units, by the add-on's own buttons: at rest as solved, eyes open, jawOpen with
-browInnerUp, a wink and a smile; with the eyes and the mouth of Close-Up Eyes.
+"""Draw the guide's picture of face units: at rest, eyes open, jawOpen with browInnerUp, a wink and a smile.
 
-    python -m research.benchmarks.pictures.face_units .demo/sample.wildcap docs/pictures/face_units.jpg
+python -m research.benchmarks.pictures.face_units .demo/sample.wildcap docs/pictures/face_units.jpg
 """
 
 import tempfile

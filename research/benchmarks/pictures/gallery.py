@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One subject's row of the gallery in docs/results/gallery.md, by one command; two lines of seven pictures:
+"""Draw one subject's picture of the gallery, two lines of seven.
 
     python -m research.benchmarks.pictures.gallery FOLDER/NAME.wildcap docs/pictures/gallery_NAME.jpg [--truth
         FOLDER/NAME/maps]
@@ -42,7 +42,7 @@ def main() -> None:
 
 
 def captured(capture: Capture) -> list[np.ndarray]:
-    """Frame and delit frame about the face, texture, and mask over the texture: sRGB, square."""
+    """Return frame and delit frame about the face, texture, and mask over the texture: sRGB, square."""
     views = read_views(capture, selected_only=True)
     head = meshes.read_obj(capture.head)
     # from the front
@@ -58,8 +58,7 @@ def captured(capture: Capture) -> list[np.ndarray]:
 
 
 def solved(capture: Capture, truth: Path | None) -> list[np.ndarray]:
-    """Albedo, true albedo, specular, normal, shading and a close-up of the albedo at the delivered size: sRGB,
-    square."""
+    """Return albedo, true albedo, specular, normal, shading and a close-up of the albedo: sRGB, square."""
     maps = capture.maps_4k if (capture.maps_4k / "shading.exr").is_file() else capture.maps
     albedo = images.read_srgb(maps / "diffuse_albedo.png")
     true = images.read_srgb(truth / "diffuse_albedo.png") if truth else np.zeros((8, 8, 3), np.float32)
@@ -97,7 +96,7 @@ def relit(capture: Capture) -> list[np.ndarray]:
 
 
 def face_square(view: View, head: meshes.Mesh) -> tuple[slice, slice]:
-    """Rows and columns of the square about the face in a view, within the picture."""
+    """Return rows and columns of the square about the face in a view, within the picture."""
     pixels, _ = view.project(template.landmark_points(head))
     middle, side = (pixels.min(0) + pixels.max(0)) / 2, 1.35 * (pixels.max(0) - pixels.min(0)).max()
     side = int(min(side, view.width, view.height))
@@ -114,7 +113,7 @@ def landmark_uv(index: int) -> np.ndarray:
 
 
 def sheet(pictures: list[np.ndarray]) -> np.ndarray:
-    """Square pictures in two lines, each TILE wide."""
+    """Return square pictures in two lines, each TILE wide."""
     tiles = [np.clip(images.resize(np.asarray(picture, np.float32), TILE, TILE), 0, 1) for picture in pictures]
     return in_rows(tiles, (len(tiles) + 1) // 2)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A sheet for the eye: frame, scan, wireframe of the head and its texture, through the cameras of the capture.
+"""Draw frame, scan, wireframe of the head and its texture, through the cameras of the capture.
 
     python -m research.benchmarks.pictures.geometry_pictures .demo/sample.wildcap docs/pictures/geometry.jpg
 
@@ -32,8 +32,7 @@ def main() -> None:
 
 
 def sheet(capture: Capture, views: int = 3) -> np.ndarray:
-    """sRGB [views * HEIGHT, W, 3]: a row for each of the leftmost, middle and rightmost views; what the capture lacks
-    is left grey."""
+    """Return a row for leftmost, middle and rightmost views, sRGB [views * HEIGHT, W, 3]; missing parts are grey."""
     head = meshes.read_obj(capture.head) if capture.head.is_file() else None
     scan = meshes.read_ply(capture.scan) if capture.scan.is_file() else None
     texture = images.read_srgb(capture.texture_png) if capture.texture_png.is_file() else None
@@ -42,7 +41,7 @@ def sheet(capture: Capture, views: int = 3) -> np.ndarray:
 
 
 def _spread(views: list[View], count: int) -> list[View]:
-    """Views from the person's right to the left, evenly spread."""
+    """Return views from the person's right to the left, evenly spread."""
     ordered = sorted(views, key=lambda view: np.arctan2(-view.axis[0], view.axis[1]))
     return [ordered[i] for i in np.unique(np.linspace(0, len(ordered) - 1, count).round().astype(int))]
 
@@ -58,7 +57,7 @@ def _row(view: View, casters: dict, texture: np.ndarray | None) -> np.ndarray:
 
 
 def _shaded(caster: raster.RayCaster, view: View, scale: float) -> np.ndarray:
-    """Grey, lit from the camera."""
+    """Return a mesh in grey, lit from the camera."""
     face, _, _ = raster.render_view(caster, view, scale)
     cosine = np.abs(meshes.face_normals(caster.mesh) @ view.axis)
     return np.repeat(np.where(face >= 0, 0.15 + 0.75 * cosine[np.maximum(face, 0)], 0.95)[..., None], 3, 2).astype(

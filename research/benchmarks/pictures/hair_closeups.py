@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Close-ups of hair that was grown over the maps of six tones of skin, under three lights, by the add-on's own buttons:
+"""Draw grown hair on six tones of skin, under three lights, by the add-on's own buttons.
 
     python -m research.benchmarks.pictures.hair_closeups FOLDER docs/pictures/hair_closeups.jpg [--resolution 256]
         [--samples 32]
@@ -16,7 +16,7 @@ BROW = {"at": "eye", "above_m": 0.008, "way": (0.35, -1.0, 0.1), "lens_mm": 220.
 
 
 def shots(_name: str) -> dict[str, CloseUp]:
-    """Picture -> what it shows."""
+    """Return the pictures of a person by name."""
     grown = {f"grown_{light}": CloseUp(light, opened=HALF_OPEN * (light == LIGHTS[-1]), **BROW) for light in LIGHTS}
     return {"painted": CloseUp(LIGHTS[0], hair=False, **BROW), **grown}
 

@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guide's picture of many faces: the eight synthetic subjects that no training sees, each filmed in a room of its
-own.
+"""Draw the guide's picture of many faces: the eight reserved synthetic subjects, each in a room of its own.
 
-    python -m research.benchmarks.pictures.subjects_sheet docs/pictures/subjects.jpg
+python -m research.benchmarks.pictures.subjects_sheet docs/pictures/subjects.jpg
 """
 
 import tempfile

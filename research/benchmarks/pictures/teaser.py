@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The README's picture of a finished capture: a frame, the mask over the texture, the solved albedo, and below them the
-head under three lights.
+"""Draw the README's picture of a finished capture: frame, mask, albedo, and the head under three lights.
 
-    python -m research.benchmarks.pictures.teaser .demo/sample.wildcap docs/pictures/teaser.jpg
+python -m research.benchmarks.pictures.teaser .demo/sample.wildcap docs/pictures/teaser.jpg
 """
 
 from pathlib import Path

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a video should and should not look like, for the guide, made with the synthetic subject.
+"""Draw the guide's pictures of good and bad videos, made with the synthetic subject.
 
     python -m research.benchmarks.pictures.video_examples docs/pictures
 
@@ -63,8 +63,7 @@ def main() -> None:
 
 
 def around(azimuth_deg: float, height_deg: float, distance: float = scene.DISTANCE) -> np.ndarray:
-    """Camera-to-world matrix [4, 4] on a sphere around the head's middle, upright; azimuth 0 is before the face,
-    positive to its left."""
+    """Return a camera-to-world matrix [4, 4] around the head, upright; azimuth 0 is in front, positive to its left."""
     azimuth, height = np.radians(azimuth_deg), np.radians(height_deg)
     back = np.array([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)])
     right = np.cross([0, 0, 1.0], back)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guide's pictures of the window, out of the screenshots that the window flows leave in dist/gui.
+"""Cut the guide's pictures of the window out of the screenshots that the window flows leave in dist/gui.
 
     make demo zip
     tests/gui/run.sh loop panels set_up
@@ -26,8 +26,10 @@ QUALITY = 88
 
 @dataclass(frozen=True)
 class WindowPicture:
-    """shots: side by side, names in dist/gui; boxes: left, top, right and bottom of what is shown of each, as shares of
-    a shot, or one for all; width_px: of each shot, at most."""
+    """Shots of dist/gui side by side.
+
+    boxes: left, top, right and bottom of each as shares of a shot, or one for all; width_px: of each shot, at most.
+    """
 
     shots: tuple[str, ...]
     width_px: int

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pages of docs/results, out of the records in research/records (`make results`):
+"""Write the pages of docs/results from the records in research/records (`make results`).
 
     python -m research.benchmarks.results [--check] [--captures FOLDER]
 
@@ -11,7 +11,8 @@ where a page is not as the records have it.
 
 No picture is made here of what is in the repository alone. teaser.jpg and gallery_NAME.jpg show solved captures:
 --captures names a folder with sample.wildcap (as `make demo` leaves it) and NAME.wildcap
-(research/benchmarks/captures/people.py). Others are made by their page's benchmark (--picture, --pictures)."""
+(research/benchmarks/captures/people.py). Others are made by their page's benchmark (--picture, --pictures).
+"""
 
 import sys
 from collections.abc import Iterator
@@ -56,7 +57,7 @@ def main() -> int:
 
 
 def pages() -> dict[Path, str]:
-    """Path and text of every page. Raises Problem where a record is missing."""
+    """Return path and text of every page. Raises Problem if a record is missing."""
     return {ROOT / "docs" / "results" / f"{name}.md": page(name) for name in NAMES}
 
 
@@ -71,7 +72,7 @@ def page(name: str) -> str:
 
 
 def strangers() -> list[str]:
-    """Return what lies in docs/results and is no page of ours."""
+    """Find files in docs/results that are no page of ours."""
     there = sorted((ROOT / "docs" / "results").glob("*.md"))
     return [
         f"{path.relative_to(ROOT)} has no research/benchmarks/results/{path.stem}.py that writes it."
@@ -81,7 +82,7 @@ def strangers() -> list[str]:
 
 
 def pictures(captures: Path) -> Iterator[list[str]]:
-    """Module and arguments of the commands that draw the pages' pictures of the solved captures in a folder."""
+    """Yield module and arguments of the commands that draw the pages' pictures of solved captures."""
     target = ROOT / "docs" / "pictures"
     for capture in sorted(path for path in captures.glob("*.wildcap") if (path / "maps" / "normal.png").is_file()):
         name, truth = capture.stem, captures / capture.stem / "maps"

@@ -84,7 +84,7 @@ def sections(comparison: Figures) -> Sections:
 
 
 def by_person(gains: dict[str, float]) -> str:
-    """dB by person, the most first."""
+    """Return the gains in dB by person, the most first."""
     return ", ".join(
         f"{name.replace('_', ' ')} {gain:+.1f}" for name, gain in sorted(gains.items(), key=lambda item: -item[1])
     )
