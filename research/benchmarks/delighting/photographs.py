@@ -63,16 +63,6 @@ TITLES = {
     "lamps": "A bearded man under seven lamps",
     "pairs": "Pairs that differ in the pigment alone, or in the light alone",
 }
-WORDS = (
-    "PSNR after one gain per channel, and *detail*, the correlation with the truth's log green between 1 and 3 "
-    "px. *Brows, eyes, lips, chin*: share of "
-    "the truth's contrast that is kept, the median over the lights; mean abs(1 - kept) of brows and eyes, each "
-    "picture apart; the deviation of kept "
-    "between the lights over the untouched photographs'. *Agreement*: PSNR of the mean squared difference between "
-    "the answers to two lights, each pair "
-    "at the truth's tone. *Slopes*: how far the answer follows a change of the light alone, and of the pigment "
-    "alone. ± is the spread over people, with pairs over groups of skin tone."
-)
 
 
 @dataclass(frozen=True)
@@ -111,7 +101,7 @@ def main() -> int:
     options = parser.parse_args()
     if options.weights:
         importlib.import_module("core.stages.delight.network").WEIGHTS = options.weights
-    text, record = [("", WORDS)], {}
+    text, record = [], {}
     for name in options.sets:
         try:
             scores = (

@@ -30,15 +30,16 @@ from ..captures.state_captures import DELIT, METHODS, SOLVED, Filmed, add_captur
 from ..maps import albedo_score
 from ..maps.albedo_score import looks
 from ..measures.table import Column, Scores, format_table, summarise, to_record
+from ..pages import prose
 from . import delight_measures, state_scores
 from .state_scores import Figures, in_pictures, in_uv, mean_of, of_person, small
 
 COMMAND = "python -m research.benchmarks.delighting.state FOLDER"
 STAGES = ("delight", "texture", "shadow_mask", "solve")
-BY_CAPTURE = (
-    "PSNR in dB in the picture after one gain, and on the map up to the person's shared light; what the solve adds to "
-    "the delit texture."
-)
+BY_CAPTURE = prose("""
+    PSNR in dB in the picture after one gain, and on the map up to the person's shared light; the gain of the solve over
+    the delit texture.
+    """)
 SHOWN = "skin", "brows", "lips", "beard"
 """Parts: eyes are objects of their own, and under them lie lids that were completed from around."""
 TABLES = {
@@ -79,37 +80,40 @@ TABLES = {
     },
 }
 WORDS = {
-    "In the picture": "In the frames with a true albedo, on the face with its brows, lips and beard, after one gain "
-    "per channel: PSNR, SSIM and FLIP; *detail* is the correlation with "
-    "the truth's log green between 1 and 3 px; *shadow step* is log(answer / truth), lit less dark, 4 to 12 px from "
-    "the shadow's edge.",
-    "Along the edges of shadows": "log(answer / truth) across the edges where the true light steps: the step; the line "
-    "at the edge above or below both "
-    "sides, and the sum of both; detail within the band of the edge and elsewhere.",
-    "Up to a light, and across lights": "On the map, against the texture of the true frames through the same "
-    "registration. *Up to one shared light*: one grey "
-    "second-order light (nine numbers) fitted to all captures of a person together is no error; what differs between "
-    "captures is. Of a person with one capture it is that capture's own. *That light* is its "
-    "standard deviation in natural log. *Agreement*: PSNR of the mean squared difference between the captures' albedos "
-    "at one tone; a flat colour agrees "
-    "perfectly, the true light tells what the registrations allow. *Slope by light*: how far the answer follows from "
-    "one capture to the other what was filmed; 0 is best, and below it too much was taken out.",
-    "Features kept": "Share of the truth's contrast that brows, lips and chin keep (1 is all); mean abs(1 - kept) of "
-    "brows, and of closed eyes, each capture "
-    "apart; the deviation of kept between a person's captures over that of the filmed textures.",
-    "Parts apart": "PSNR, and the median of the grey log(answer / truth), in each part of the map after the whole "
-    "face's gain. True part masks where "
-    "the subject has them, else the built-in head's.",
+    "In the picture": """
+        In the frames with a true albedo, on the face with its brows, lips and beard, after one gain per channel: PSNR,
+        SSIM and FLIP; *detail*, the correlation with the truth's log green between 1 and 3 px; *shadow step*,
+        log(answer / truth), lit less dark, 4 to 12 px from the shadow's edge.
+        """,
+    "Along the edges of shadows": """
+        log(answer / truth) across the edges where the true light steps: the step; the line at the edge above or below
+        both sides, and the sum of both; detail within the band of the edge and elsewhere.
+        """,
+    "Up to a light, and across lights": """
+        On the map, against the texture of the true frames through the same registration. *Up to one shared light*: one
+        grey second-order light (nine numbers), fitted to all captures of a person together, is no error; the
+        differences between captures are. For a person with one capture it is that capture's own. *That light* is its
+        standard deviation in natural log. *Agreement*: PSNR of the mean squared difference between the captures'
+        albedos at one tone; a flat colour agrees perfectly, and the true light shows the limit set by the
+        registrations. *Slope by light*: how far the answer follows the filmed change from one capture to another; 0 is
+        best, and below it too much was removed.
+        """,
+    "Features kept": """
+        Kept share of the truth's contrast of brows, lips and chin (1 is all); mean abs(1 - kept) of brows, and of
+        closed eyes, each capture apart; the deviation of the kept share between a person's captures, over that of the
+        filmed textures.
+        """,
+    "Parts apart": """
+        PSNR, and the median of the grey log(answer / truth), in each part of the map after the whole face's gain. Part
+        masks are the subject's true ones if it has any, else the built-in head's.
+        """,
 }
-INTRODUCTION = (
-    "Means over people ± their spread (standard deviation; one person's figure is the mean of its "
-    "captures), then the differences from the delit "
-    "texture, person by person, ± the standard error of their mean: bold where better by more than two of "
-    "those, italic where worse. Doing "
-    "nothing is the texture as filmed, a flat colour its mean, the blur's deviation is 2 % of the face's "
-    "height, and the true light is the "
-    "texture of the true albedo frames."
-)
+INTRODUCTION = prose("""
+    First the means over people ± their spread (standard deviation; a person's figure is the mean of its captures), then
+    the differences from the delit texture, person by person, ± the standard error of their mean: bold if better by more
+    than two standard errors, italic if worse. Doing nothing is the texture as filmed, a flat colour its mean, the
+    blur's deviation is 2 % of the face's height, and the true light is the texture of the true albedo frames.
+    """)
 
 
 def main() -> int:
@@ -217,7 +221,7 @@ def sections(scores: Scores, by_capture: dict[str, dict[str, Figures]]) -> list[
     parts = [("", f"{INTRODUCTION} {len(by_capture)} captures of {len(persons)} people.")]
     for title, columns in TABLES.items():
         if found := summarise(scores, columns, DELIT):
-            parts.append((title, f"{WORDS[title]}\n\n{format_table(found, columns, 'taken for albedo', DELIT)}"))
+            parts.append((title, prose(WORDS[title], format_table(found, columns, "taken for albedo", DELIT))))
     return [*parts, ("Capture by capture", f"{BY_CAPTURE}\n\n{by_capture_table(by_capture)}")]
 
 

@@ -52,30 +52,6 @@ SOWN = {"brows": brows.grow_brows, "beard": beards.grow_beard}
 """The rules by which the people have their hair."""
 WANTED_IOU, WANTED_DEGREES = 0.7, 20
 COMMAND = "python -m research.benchmarks.head.groomed FOLDER --json research/records/groomed.json"
-WORDS = (
-    "Four people whose every hair is known, from nine sides through a phone's pipeline (1,440 x 1,920). No "
-    "other step of the chain lies between: cameras, head and texture are the true ones, and the face parser is "
-    "asked in these pictures. *IoU*: of the pixels that hair covers, by the true and by the grown hairs, seen "
-    "from either side of the front. *Amount*: what both cover of a pixel's surroundings of 3 mm, over what "
-    "either does. *Anew*: either one, for the true hairs sown anew by the same rule, with other roots: no more "
-    "can be known where pictures show no single hairs. *Parser*: of the texels to which the parser gives more "
-    "than half, and those where hair grows, whether a fringe hides them or not. *Off*: the median angle on the "
-    "skin between each true hair and the nearest grown one within 3 mm, from root to tip; *off, usual*: the "
-    "same of hair that lies as anatomy has it, whatever the strokes say. Wanted: an IoU of 0.7, and 20 "
-    "degrees. Nothing but the rules for stubble was chosen on these four. How clear strokes must be to "
-    "outweigh the usual direction was, on seeds 3, 5 and 13, and there the rule that joins the parser's answer "
-    "with the strokes was looked at, too. *mm*: mean length of the hairs.\n\n"
-    "A beard is stubble where its strokes are shorter than 2 mm and no more blue light is missing than stubble "
-    "and the shade of a shaven beard take, the shade as these people's generator paints it; then a hair is as "
-    "long as a stroke (core/stages/upscale/stroke_length.py). That rule was made with these people in view, and on no "
-    "others; so was the one that takes the parser's shares of a beard over what they are in its middle, which "
-    "the stubbled person asked for.\n\n"
-    "Where it falls short: of a beard no length is told, its hairs are 6 mm long on everybody (*Beard Length* "
-    "is the artist's). Stubble hides little of the skin, so its IoU mostly compares where hairs happen to lie "
-    "close together, which sown anew they do elsewhere; its hairs have the brows' colour. Where both brows lie "
-    "behind a fringe, usual ones are grown, in no colour of the person's. Dark brows become a little wider "
-    "than by dark strokes alone."
-)
 CHOSEN_ON, TRUSTS, TURNS = (3, 5, 13), (0.03, 0.1, 0.3, 1.0, 3.0), (-40, 0, 40)
 """People on whom the trust in strokes was chosen; degrees by which the usual directions are turned, for nobody's hair
 is all as usual."""

@@ -28,11 +28,6 @@ TONES = {
 """Linear albedo of skin of the six groups of ITA, rounded (research/benchmarks/delighting/skin_tone.py has the
 groups)."""
 WAYS = ("random walk", "random walk (skin)", "WildCap Skin")
-WORDS = """Red, green and blue light from the middle of a sphere as large as a head over its albedo, in Cycles, under
-even light from everywhere and without gloss: 1 is all of it. *Random walk*: Cycles's method of that name,
-which the material had in 0.1.0, with the albedo as the Base Color. *Random walk (skin)*: the other one.
-*WildCap Skin*: the material as it is, which multiplies the albedo by what the second one loses in the mean
-over the tones, as far as *Subsurface* is on; the map itself stays as it was measured."""
 RADIUS_M, SEEN_M = 0.09, 0.012
 """The sphere's radius and the side of what is seen of it: Cycles takes scattering that is shorter than a pixel for
 none."""

@@ -172,14 +172,13 @@ def sections(record: dict) -> Sections:
     found, people = summarise(record["people"], COLUMNS), len(record["people"][SHIPPED])
     plain = confidence.PLAIN_DEVIATION
     words = prose(f"""
-        A confidence of *c* says that the grey logarithm of the albedo is right within {plain:.2f} / *c* in two texels
-        of three: {100 * plain:.0f} % where it is 1, twice as much where it is a half. Means over people ± their spread,
-        {len(record["captures"])} captures of {people} people, over the texels of the face that were seen well. *Nats
-        gained*: mean log-likelihood over that of the best constant of the capture (aim: 0.1), and *within one sigma*
-        (aim: 0.60 to 0.76, 0.683 for normal errors), both by the factor that is best for the capture; *as it is*,
-        without. *Error of the surer half* is over that of the other. *{LEFT_OUT.capitalize()}*: the deviations of all
-        other people, for each. *{BLURRED.capitalize()}* over {BLUR_TEXELS:.0f} texels of {SIZE}: what one would have
-        to know for more.
+        A confidence of *c* means that the grey logarithm of the albedo is right within {plain:.2f} / *c* in two texels
+        of three: {100 * plain:.0f} % for 1, twice as much for a half. Means over people ± their spread,
+        {len(record["captures"])} captures of {people} people, over well-seen texels of the face. *Nats gained*: mean
+        log-likelihood over that of the capture's best constant (goal: 0.1); *within one sigma* (goal: 0.60 to 0.76,
+        0.683 for normal errors); both with the best factor for the capture; *as it is*: without it. *Error of the surer
+        half*: over that of the other half. *{LEFT_OUT.capitalize()}*: the deviations of all other people, for each.
+        *{BLURRED.capitalize()}* over {BLUR_TEXELS:.0f} texels of {SIZE}: the knowledge that a higher gain would need.
         """)
     names = ["", *(f"`{name}`" for name in record["deviations"])]
     rows = [
@@ -201,8 +200,8 @@ def sections(record: dict) -> Sections:
         ),
         (
             "The deviations",
-            "In natural log (`core/stages/solve/confidence.py`), and what all these captures make most "
-            "likely.\n\n" + figures.markdown(names, rows),
+            "In natural log (`core/stages/solve/confidence.py`), and the most likely values for these captures.\n\n"
+            + figures.markdown(names, rows),
         ),
     ]
 

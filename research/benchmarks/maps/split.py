@@ -41,7 +41,7 @@ from ..captures.state_captures import DELIT, SIZE, SOLVED, Filmed, add_captures,
 from ..delighting.state_scores import in_uv, mean_of, of_person, small
 from ..measures.references import NOTHING, TRUE
 from ..measures.table import Column, Scores, format_table, summarise, to_record
-from ..pages import Sections
+from ..pages import Sections, prose
 
 COMMAND = "python -m research.benchmarks.maps.split FOLDER --json research/records/split.json"
 ALONE, TOGETHER, LESS, MORE = (
@@ -57,30 +57,26 @@ COLUMNS = {
     "psnr_alone": Column("up to a light of its own, dB"),
     "agreement": Column("agreement, dB"),
 }
-WORDS = (
-    "Means over people ± their spread, then differences from the delit texture, person by person, ± the standard "
-    "error of their mean. *Up to one "
-    "shared light*: one grey second-order light, fitted to all captures of a person together, is no error (a "
-    "capture cannot tell it from skin, and a "
-    "scan's own map holds some); what differs between captures is. *Agreement*: PSNR of the difference between "
-    "the captures' albedos. *Split alone* is "
-    "the texture over the global light that the closed form finds, before anything is sampled; *together*, over "
-    "the light that it finds with all "
-    "captures of that person. Rows beside these are solves of the same textures by other code or options "
-    "(`--beside`): *solved before* by commit c93b420, "
-    "whose lights were held back by pulls chosen by hand, *solved together* by `core run - CAPTURE --from solve "
-    "--until solve --with OTHERS`."
-)
-PARTS = (
-    "![As filmed, delit, mean face, with traits, global light; local light, texture over light, solved, true, "
-    "deviation](../pictures/split.jpg)\n\n"
-    "A lamp from below (`python -m research.benchmarks.maps.split FOLDER --only stubbled_below --picture "
-    "docs/pictures/split.jpg`). Above: as filmed, delit, the mean face of the tone, that with the traits that "
-    "were found; the light of the whole face that the delighter left. Below: what it left locally, the delit "
-    "texture over the light of the whole face, as solved, the truth; and how large an error is expected, black "
-    "to a deviation of 0.4 in natural log. What stays is mostly the delighter's: noise in the dark, a nose whose "
-    "shadow was brightened too much."
-)
+WORDS = """
+    Means over people ± their spread, then differences from the delit texture, person by person, ± the standard error of
+    their mean. *Up to one shared light*: one grey second-order light, fitted to all captures of a person together, is
+    no error (a capture cannot tell it from skin, and a scan's own map contains some); the differences between captures
+    are. *Agreement*: PSNR of the difference between the captures' albedos. *Split alone*: the texture over the global
+    light that the closed form finds before anything is sampled; *together*: over the light that it finds with all
+    captures of that person. The other rows are solves of the same textures by other code or options (`--beside`):
+    *solved before* by commit c93b420, whose lights were held back by pulls chosen by hand, *solved together* by `core
+    run - CAPTURE --from solve --until solve --with OTHERS`.
+    """
+PARTS = """
+    ![As filmed, delit, mean face, with traits, global light; local light, texture over light, solved, true,
+    deviation](../pictures/split.jpg)
+
+    A lamp from below (`python -m research.benchmarks.maps.split FOLDER --only stubbled_below --picture
+    docs/pictures/split.jpg`). Above: as filmed, delit, the mean face of the tone, the same with the found traits, and
+    the global light that the delighter left. Below: the local light that it left, the delit texture over the global
+    light, the solved albedo, the truth, and the expected error, black to a deviation of 0.4 in natural log. Most of the
+    rest is the delighter's: noise in the dark, a nose whose shadow was brightened too much.
+    """
 DOUBTFUL = 0.4
 """Deviation in natural log that is white in the picture."""
 
@@ -114,8 +110,8 @@ def sections(record: dict) -> Sections:
     people, captures = {name for rows in record["people"].values() for name in rows}, record["captures"]
     found = summarise(record["people"], COLUMNS, DELIT)
     parts = [
-        ("", f"{WORDS} {len(captures)} captures of {len(people)} people."),
-        ("The parts", PARTS),
+        ("", f"{prose(WORDS)} {len(captures)} captures of {len(people)} people."),
+        ("The parts", prose(PARTS)),
         ("All people", format_table(found, COLUMNS, "taken for albedo", DELIT)),
         ("Capture by capture, up to the person's shared light, dB", capture_table(captures)),
         ("The scales that were found", scale_table(record["scales"])),

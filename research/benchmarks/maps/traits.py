@@ -126,26 +126,23 @@ def sections(record: dict) -> Sections:
         ]
         for kind, of in record.items()
     ]
-    words = prose(f"""
-        Of {painted["skins"]} painted skins of the VALID avatars, one of each base, the grey log ratio to their median,
-        by distance; hair and make-up are left out. What light is painted into such skins and what their traits are
-        cannot be told apart: *as painted* takes all for traits, *light taken out* none that a sky explains. The split
-        ([skin or light](split.md)) takes exp(-distance / {1e3 * split.TRAIT_REACH_M:.0f} mm), and
-        {split.MIRROR_CORRELATION} of it with the mirror image, midway; where skins differ more than elsewhere
-        (`core/weights/traits.json`), traits may be larger.
-        """)
+    words = f"""
+        The grey log ratio of {painted["skins"]} painted skins of the VALID avatars, one of each base, to their median,
+        by distance; hair and make-up are left out. Light that is painted into such skins cannot be told from their
+        traits: *as painted* takes all for traits, *light taken out* nothing that a sky explains. The split ([skin or
+        light](split.md)) takes exp(-distance / {1e3 * split.TRAIT_REACH_M:.0f} mm), and {split.MIRROR_CORRELATION} of
+        it with the mirror image, midway; where skins differ more than elsewhere (`core/weights/traits.json`), traits
+        may be larger.
+        """
+    z_words = """
+        Standard deviation of a skin's z-scores, its difference from the other skins over theirs at that place, one left
+        out at a time: of all (goal: 0.8 to 1.25), of the skin with the least and the most, and of all by region (goal:
+        0.6 to 1.6).
+        """
+    z_table = figures.markdown(["z, light painted into the skins", "all", "least", "most", *names], scores)
     return [
-        ("How skins differ", words + "\n\n" + figures.markdown(head, rows)),
-        (
-            "How well that holds for others",
-            prose("""
-        Standard deviation of a skin's z-scores, its difference from the other skins over theirs at that place, one
-        left out at a time: of all (aim: 0.8 to 1.25), of the skin with the least and the most, and of all by region
-        (aim: 0.6 to 1.6).
-        """)
-            + "\n\n"
-            + figures.markdown(["z, light painted into the skins", "all", "least", "most", *names], scores),
-        ),
+        ("How skins differ", prose(words, figures.markdown(head, rows))),
+        ("How well that holds for others", prose(z_words, z_table)),
     ]
 
 

@@ -4,14 +4,13 @@
 
     python -m research.benchmarks.results [--check] [--captures FOLDER]
 
-Runs no benchmark: each leaves its record by its own --json (research/benchmarks/figures.py). NAME.py in here is the
-page docs/results/NAME.md: TITLE, SAYS (what it shows, below the title), RECORDS, and `sections`, which takes the
-figures of these records in that order and gives headings with Markdown. --check writes nothing and ends with code 1
-where a page is not as the records have it.
+No benchmark runs: each writes its record with --json (research/benchmarks/figures.py). NAME.py in here is the page
+docs/results/NAME.md: TITLE, SAYS (its content, below the title), RECORDS, and `sections`, which takes the figures of
+these records in that order and returns Markdown, or headings with Markdown. --check writes nothing and ends with code 1
+if a page differs from the records.
 
-No picture is made here of what is in the repository alone. teaser.jpg and gallery_NAME.jpg show solved captures:
---captures names a folder with sample.wildcap (as `make demo` leaves it) and NAME.wildcap
-(research/benchmarks/captures/people.py). Others are made by their page's benchmark (--picture, --pictures).
+teaser.jpg and gallery_NAME.jpg show solved captures: --captures names a folder with sample.wildcap (of `make demo`) and
+NAME.wildcap (research/benchmarks/captures/people.py). Other pictures are made by their page's benchmark.
 """
 
 import sys
@@ -65,7 +64,8 @@ def page(name: str) -> str:
     """Return the text of docs/results/NAME.md."""
     module = import_module(f"{__name__}.{name}")
     records = [figures.read_record(record) for record in module.RECORDS]
-    sections = module.sections(*(figures.Figures.of(record["figures"]) for record in records))
+    found = module.sections(*(figures.Figures.of(record["figures"]) for record in records))
+    sections = [("", found)] if isinstance(found, str) else found
     if name == "index":  # of the records of many pages
         return page_text(module.TITLE, [], sections)
     return page_text(module.TITLE, records, [("", module.SAYS), *sections])
