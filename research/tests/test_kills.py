@@ -5,7 +5,6 @@ wrong."""
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -50,8 +49,8 @@ def test_a_handful_of_kills_loses_nothing_and_ends_in_the_same_bytes():
 
 @pytest.fixture
 def place(tmp_path) -> Path:
-    """A capture with the user's files, and one stage's output."""
-    place = tmp_path / "place"
+    """A capture with the user's files and one stage's output; the same beside it as the end of an undisturbed run."""
+    place = tmp_path / "end"
     for name, content in STRANGERS.items():
         path = capture_at(place).root / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -59,14 +58,17 @@ def place(tmp_path) -> Path:
     (place / BESIDE).write_bytes(STRANGERS["shopping.txt"])
     capture_at(place).json.write_text(json.dumps({"format": 2, "source": "", "stages": {"frames": make_entry()}}))
     (capture_at(place).frames / "00000.jpg").write_bytes(b"a frame")
-    return place
+    return copy_place(place, tmp_path / "place")
 
 
-def test_the_judge_is_content_with_what_is_whole_and_finds_every_fault(place):
-    root, known = capture_at(place).root, {"frames/00000.jpg": {read_hash(capture_at(place).frames / "00000.jpg")}}
-    undisturbed = Undisturbed(place.parent, {}, ("frames",), known=known)
-    place.rename(place.parent / "end")
-    copy_place(place.parent / "end", place)
+@pytest.fixture
+def undisturbed(place) -> Undisturbed:
+    known = {"frames/00000.jpg": {read_hash(capture_at(place).frames / "00000.jpg")}}
+    return Undisturbed(place.parent, {}, ("frames",), known=known)
+
+
+def test_the_judge_is_content_with_what_is_whole_and_finds_every_fault(place, undisturbed):
+    root, known = capture_at(place).root, undisturbed.known
     assert judge.judge_kill(place, known) == [] and judge.judge_resume(place, undisturbed, "frames") == []
     for name, content, fault in (
         ("frames/00000.jpg", b"a fra", "no complete content"),
@@ -81,43 +83,35 @@ def test_the_judge_is_content_with_what_is_whole_and_finds_every_fault(place):
         before = (root / name).read_bytes() if (root / name).exists() else None
         (root / name).parent.mkdir(exist_ok=True)
         (root / name).write_bytes(content)
-        assert [told for told in judge.judge_kill(place, known) if fault in told], name
+        assert any(fault in found for found in judge.judge_kill(place, known)), name
         (root / name).unlink() if before is None else (root / name).write_bytes(before)
-    told = judge.judge_kill(place, known, {"shadow_mask.png": (b"old", b"new")})
-    assert told == ["shadow_mask.png is neither the old mask nor a new one"]
-    (root / "notes" / "list.txt").rename(root / "list.txt")
+    masks = {"shadow_mask.png": (b"old", b"new")}
+    assert judge.judge_kill(place, known, masks) == ["shadow_mask.png is neither the old mask nor a new one"]
+    (root / "notes" / "list.txt").unlink()
     assert "the user's notes/list.txt is gone" in judge.judge_kill(place, known)
-    (root / "list.txt").rename(root / "notes" / "list.txt")
 
 
-def test_the_judge_finds_what_is_left_after_the_run_that_goes_on(place):
-    undisturbed = Undisturbed(
-        place.parent, {}, ("frames",), known={"frames/00000.jpg": {read_hash(capture_at(place).frames / "00000.jpg")}}
-    )
-    place.rename(place.parent / "end")
-    for name, fault in (
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
         (".scan.1.tmp.ply", "is left"),
         ("lock.succeeding", "is left"),
         ("kept/frames/00000.jpg", "nobody changed it"),
         ("../stray.txt", "lies beside"),
         ("lock", "the lock is not free"),
-    ):
-        copy_place(place.parent / "end", place)
-        path = capture_at(place).root / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(b"")
-        assert [told for told in judge.judge_resume(place, undisturbed, "frames") if fault in told], name
-        shutil.rmtree(place)
-    copy_place(place.parent / "end", place)
-    (capture_at(place).frames / "00000.jpg").write_bytes(b"another")
-    assert "frames/00000.jpg is not as in the undisturbed run" in judge.judge_resume(place, undisturbed, "frames")
-    assert "the stage cameras is not on record" in judge.judge_resume(place, undisturbed, "cameras")
+        ("frames/00000.jpg", "frames/00000.jpg is not as in the undisturbed run"),
+    ],
+)
+def test_the_judge_finds_what_is_left_after_the_run_that_goes_on(place, undisturbed, name, fault):
+    path = capture_at(place).root / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(b"")
+    found = judge.judge_resume(place, undisturbed, "cameras")
+    assert any(fault in each for each in found) and "the stage cameras is not on record" in found
 
 
 @pytest.mark.parametrize(
-    "moment",
-    [worker.Moment(after_s=0.3), worker.Moment(write=3), worker.Moment(write=3, late_s=0.05)],
-    ids=str,
+    "moment", [worker.Moment(after_s=0.3), worker.Moment(write=3), worker.Moment(write=3, late_s=0.05)], ids=str
 )
 def test_a_process_is_struck_at_its_moment(tmp_path, moment):
     def work() -> None:

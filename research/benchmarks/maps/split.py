@@ -68,8 +68,7 @@ WORDS = """
     run - CAPTURE --from solve --until solve --with OTHERS`.
     """
 PARTS = """
-    ![As filmed, delit, mean face, with traits, global light; local light, texture over light, solved, true,
-    deviation](../pictures/split.jpg)
+    ![The parts of the split, from the filmed texture to the expected error](../pictures/split.jpg)
 
     A lamp from below (`python -m research.benchmarks.maps.split FOLDER --only stubbled_below --picture
     docs/pictures/split.jpg`). Above: as filmed, delit, the mean face of the tone, the same with the found traits, and

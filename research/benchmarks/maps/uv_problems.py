@@ -5,8 +5,7 @@
 texture = albedo * (global SH + the rest) * shadow, blurred by a texel, with noise. The global SH are fitted to a sky
 with its occlusion and a sun; the rest is what they cannot explain, scaled to 10 % of the light; shadow is what cast
 shadows leave of it, per channel. Of kind "delit" the shading is nearly flat already, 30 to 60 % of each shadow is left
-and the colour is off by a few percent over large regions, as a delighter leaves its frames. A
-`make_plain_problem` has a sky and a sun as they are, and noise.
+and the colour is off by a few percent over large regions, as a delighter leaves its frames.
 """
 
 import hashlib
@@ -23,7 +22,7 @@ from core.capture.capture import Capture
 from core.capture.files import replacing
 from core.capture.messages import Reporter
 from core.face import template
-from core.geometry import meshes, raster
+from core.geometry import meshes
 from core.imaging import images
 from core.solver.lighting import fit_global, shading_basis
 from core.stages.solve.skin_tone import GIVEN, SkinTone
@@ -104,17 +103,6 @@ def make_problem(subject: str, shadows: str, size: int, kind: str = "raw") -> Ma
     lit = albedo * shading * kept
     lit *= 0.8 / np.percentile(lit[face].max(-1), 99.5)
     seen = cv2.GaussianBlur(lit, (3, 3), 0.5) + rng.normal(0, NOISE, lit.shape)
-    return MaskedUvProblem(albedo, np.maximum(seen, 0).astype(np.float32), shadow, _painted(shadow))
-
-
-def make_plain_problem(seed: int, shadows: str, size: int) -> MaskedUvProblem:
-    """Return a subject of research/people in a random light of that seed; `shadows`: self, leaves, blinds or edge."""
-    rng, albedo = np.random.default_rng([seed, 7]), albedo_of(str(seed), size)
-    shading, shadow, _ = bake(template.load(), size, random_light(rng), shadows, rng)
-    covered = raster.rasterize_uv(template.load(), size)[0] >= 0
-    bright = np.percentile((albedo * shading)[covered].max(-1), 99.5)
-    exposure = min(rng.uniform(0.7, 1.1) / np.percentile(shading[covered].mean(-1), 90), 1 / bright)
-    seen = albedo * (shading * exposure) + np.random.default_rng(seed).normal(0, NOISE, albedo.shape)
     return MaskedUvProblem(albedo, np.maximum(seen, 0).astype(np.float32), shadow, _painted(shadow))
 
 
