@@ -70,24 +70,9 @@ def ask(name: str, packages: list[str], *more: str) -> dict[str, Wheel]:
     """Return the wheels that pip chooses for a lock, without dependencies. Raises Problem if one is missing."""
     with tempfile.TemporaryDirectory(prefix="wildcap_lock_") as folder:
         report = Path(folder) / "report.json"
-        command = [
-            sys.executable,
-            "-m",
-            "pip",
-            "install",
-            "--disable-pip-version-check",
-            "--quiet",
-            "--dry-run",
-            "--ignore-installed",
-            "--no-deps",
-            "--target",
-            folder,
-            "--report",
-            report,
-            *wheels.tags(name),
-            *more,
-            *packages,
-        ]
+        words = "-m pip install --disable-pip-version-check --quiet --dry-run --ignore-installed --no-deps".split()
+        places = ("--target", folder, "--report", report)
+        command = [sys.executable, *words, *places, *wheels.tags(name), *more, *packages]
         ended = subprocess.run([str(word) for word in command], capture_output=True, text=True)
         if ended.returncode:
             errors = [line for line in ended.stderr.splitlines() if line.startswith("ERROR")]
@@ -95,17 +80,12 @@ def ask(name: str, packages: list[str], *more: str) -> dict[str, Wheel]:
                 f"{name}: {' '.join(errors) or ended.stderr[-300:]}",
                 "Choose versions that have wheels for it in requirements/worker.txt.",
             )
-        chosen = {}
-        for entry in json.loads(report.read_text(encoding="utf-8"))["install"]:
-            about, source = entry["metadata"], entry["download_info"]
-            wheel = Wheel(
-                locks.normal(about["name"]),
-                about["version"],
-                source["url"],
-                source.get("archive_info", {}).get("hashes", {}).get("sha256", ""),
-                tuple(about.get("requires_dist", ())),
-            )
-            chosen[wheel.name] = wheel
+        entries = json.loads(report.read_text(encoding="utf-8"))["install"]
+    chosen = {}
+    for about, source in ((entry["metadata"], entry["download_info"]) for entry in entries):
+        sha256 = source.get("archive_info", {}).get("hashes", {}).get("sha256", "")
+        package, needs = locks.normal(about["name"]), tuple(about.get("requires_dist", ()))
+        chosen[package] = Wheel(package, about["version"], source["url"], sha256, needs)
     return chosen
 
 
@@ -117,19 +97,12 @@ def environment_of(name: str) -> dict[str, str]:
         "macosx_arm64": ("Darwin", "darwin", "arm64", "posix"),
         "manylinux_x86_64": ("Linux", "linux", "x86_64", "posix"),
     }[platform]
+    full = f"{python}.0"
     return {
-        "platform_system": system,
-        "sys_platform": short,
-        "platform_machine": machine,
-        "os_name": kind,
-        "python_version": python,
-        "python_full_version": f"{python}.0",
-        "implementation_name": "cpython",
-        "platform_python_implementation": "CPython",
-        "implementation_version": f"{python}.0",
-        "platform_release": "",
-        "platform_version": "",
-        "extra": "",
+        **{"platform_system": system, "sys_platform": short, "platform_machine": machine, "os_name": kind},
+        **{"python_version": python, "python_full_version": full, "implementation_version": full},
+        **{"implementation_name": "cpython", "platform_python_implementation": "CPython"},
+        **dict.fromkeys(("platform_release", "platform_version", "extra"), ""),
     }
 
 

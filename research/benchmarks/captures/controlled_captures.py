@@ -30,6 +30,7 @@ from ..light.flash_light import write_delit
 from ..light.relit_maps import toned
 from .continued import begin_at_delight, run_stages
 
+load_prior = cache(load)
 EMPTY = np.zeros((64, 64), np.float32)
 
 
@@ -46,7 +47,7 @@ def flash(source: Capture, work: Capture, settings: Settings) -> Capture:
 
 def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict]:
     """Return the solved albedo, sRGB [S, S, 3], with an even light held throughout, and the seconds."""
-    began, prior = time.monotonic(), _prior()
+    began, prior = time.monotonic(), load_prior()
     recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0, linear=0.0)
     evidence = read_evidence(capture, read_head(capture), settings.solve.size)
     start = start_solve(
@@ -97,8 +98,3 @@ def as_albedo(capture: Capture, settings: Settings) -> np.ndarray:
     tone = np.array(read_given_tone(settings.solve.skin_tone).linear, np.float32)
     skin = images.read_data(capture.texture_confidence)[..., 0] * template.mask("skin", len(texture))
     return images.linear_to_srgb(toned(texture, tone, skin))
-
-
-@cache
-def _prior():
-    return load()

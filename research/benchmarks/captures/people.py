@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Film six synthetic people of six skin tones, none seen by any training, each in another light; and solve them.
 
-    python -m research.benchmarks.captures.people FOLDER [--only NAME ...] [--places wild flash studio] [--until STAGE]
-        [--quality NAME] [--no-solve]
+    python -m research.benchmarks.captures.people FOLDER [--only NAME ...] [--places wild flash studio] [--no-solve]
 
 FOLDER/NAME.wildcap is the capture, FOLDER/NAME its truth in the layout that research/benchmarks/maps/albedo_score.py
 reads, with maps/ (the true maps, 2048) and head.obj. Cycles traces the paths: shadows, two bounces, highlights, but no
@@ -25,7 +24,7 @@ from core.capture.messages import Done, StageDone
 from core.capture.stages import STAGES
 from core.geometry import meshes
 from core.imaging import images
-from core.settings.settings import QUALITIES, Settings, from_json, preset
+from core.settings.settings import Settings, from_json
 from core.worker.job import write_job
 from core.worker.runner import run_job
 
@@ -69,15 +68,13 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
     parser.add_argument("--places", nargs="+", choices=PLACES, default=PLACES[:1])
-    parser.add_argument("--until", choices=[s.name for s in STAGES[4:]], default="upscale")
-    parser.add_argument("--quality", choices=QUALITIES, default="standard")
     parser.add_argument("--no-solve", action="store_true", help="make the captures and their truth only")
-    arguments = parser.parse_args()
-    for person in (p for p in PEOPLE if p.name in arguments.only):
-        for place in arguments.places:
-            capture = make(person, arguments.folder.resolve(), place)
-            if place == "wild" and not arguments.no_solve:
-                solve_person(capture, arguments.folder / person.name, arguments.until, arguments.quality)
+    options = parser.parse_args()
+    for person in (p for p in PEOPLE if p.name in options.only):
+        for place in options.places:
+            capture = make(person, options.folder.resolve(), place)
+            if place == "wild" and not options.no_solve:
+                solve_person(capture, options.folder / person.name, "upscale")
 
 
 def make(person: FilmedPerson, folder: Path, place: str = "wild") -> Capture:
@@ -119,18 +116,18 @@ def _set(person: FilmedPerson, place: str) -> tuple[scene.SceneLight, np.ndarray
     return (KINDS | FURTHER)[person.light](person.seed), path
 
 
-def solve_person(capture: Capture, truth: Path, until: str, quality: str) -> None:
+def solve_person(capture: Capture, truth: Path, until: str) -> None:
     """Run the stages that are not fresh, from delight on, or from the scan if there is no head, with the true tone.
 
     truth: folder with the tone. Raises SystemExit with the problem if a stage fails.
     """
     values = {"solve": {"skin_tone": skin_tone(truth)}}
-    names, settings = [stage.name for stage in STAGES], from_json(values, preset(quality))
+    names, settings = [stage.name for stage in STAGES], from_json(values)
     begin = names.index("delight" if capture.head.is_file() else "scan")
     chosen = STAGES[begin : names.index(until) + 1]
     stale = [stage.name for stage in chosen if capture.state(stage, settings) != "done"]
     if stale:
-        job = write_job(capture, first=stale[0], last=until, settings=values, quality=quality)
+        job = write_job(capture, first=stale[0], last=until, settings=values)
         ended = run_job(job, lambda message: print(message, flush=True) if isinstance(message, StageDone) else None)
         if not isinstance(ended, Done):
             raise SystemExit(str(ended))

@@ -22,7 +22,6 @@ over the pictures:
 
 import argparse
 import importlib
-import json
 import sys
 import tempfile
 import time
@@ -50,75 +49,42 @@ SETS = ("faceolat", "portraits", "lps_sun", "sample")
 BROUGHT = ("none", "folder", "switchlight", "opendelight")
 """Delighters that need something of the user's, or nothing at all: no rows of their own on captures."""
 FLAT = "flat true tone"
+COMMAND = "python -m research.benchmarks.delighting.delight [--data DIR]"
 QUICK = 4  # every n-th picture
 
 
 def main() -> None:
     parser = figures.command_line(__doc__, "delight")
-    parser.add_argument(
-        "--data", type=Path, default=SHARED / "faceolat", help="photographs with their albedo, laid out like faceolat"
-    )
-    parser.add_argument(
-        "--sets", nargs="+", default=SETS, help=f"of {', '.join(SETS)}, or folders with capture.mp4, albedo and face"
-    )
+    parser.add_argument("--data", type=Path, default=SHARED / "faceolat", help="photographs laid out like faceolat")
+    parser.add_argument("--sets", nargs="+", default=SETS, help=f"of {', '.join(SETS)}, or folders of a truth")
     parser.add_argument("--rows", nargs="+", help="only rows whose name begins with one of these")
-    parser.add_argument(
-        "--capture", action="append", default=[], metavar="NAME=FOLDER", help="a registered capture of that set"
-    )
-    parser.add_argument(
-        "--work",
-        type=Path,
-        default=Path(tempfile.gettempdir()) / "wildcap_delight",
-        help="where captures are made and kept",
-    )
+    parser.add_argument("--capture", action="append", default=[], metavar="NAME=FOLDER", help="registered, of that set")
+    work = Path(tempfile.gettempdir()) / "wildcap_delight"
+    parser.add_argument("--work", type=Path, default=work, help="folder in which captures are made and kept")
     parser.add_argument("--opendelight", default="", help="the authors' checkpoint")
-    parser.add_argument(
-        "--weights",
-        type=Path,
-        help="weights of our network, with their card beside them, instead of those that are shipped",
-    )
-    parser.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
+    parser.add_argument("--weights", type=Path, help="other weights of our network, with their card beside them")
     parser.add_argument("--quick", action="store_true", help=f"every {QUICK}th picture, without the feature distance")
     parser.add_argument("--picture", type=Path, help="six photographs of the set, truth and rows side by side")
     options = parser.parse_args()
     if options.picture and len(options.sets) != 1:
         parser.error("--picture shows one set: name it with --sets")
-    settings = Settings(device=options.device)
-    if options.opendelight:
-        settings = replace(settings, delight=replace(settings.delight, checkpoint=options.opendelight))
+    settings = Settings(device="cpu")
+    settings = replace(settings, delight=replace(settings.delight, checkpoint=options.opendelight))
     if options.weights:
         importlib.import_module("core.stages.delight.network").WEIGHTS = options.weights
     captures = dict(pair.split("=", 1) for pair in options.capture)
     results = figures.read_figures(options.json)
     for name in options.sets:
-        title = Path(name).name
         with tempfile.TemporaryDirectory() as folder:
             try:
-                found = measure_rows(
-                    _set(name, options, captures, Path(folder)),
-                    settings,
-                    not options.quick,
-                    options.rows,
-                    options.picture,
-                )
+                chosen = _set(name, options, captures, Path(folder))
+                found = measure_rows(chosen, settings, not options.quick, options.rows, options.picture)
             except Problem as problem:
                 found = {"-": {"not_run": f"{problem.problem} {problem.remedy}"}}
-        results[title] = {**results.get(title, {}), **found}
-        figures.write_record(
-            options.json, "delight", "python -m research.benchmarks.delighting.delight [--data DIR]", results
-        )
-    print(table(results))
-    if any(
-        row.startswith("network") and "figures" in found for rows_ in results.values() for row, found in rows_.items()
-    ):
-        print(
-            "",
-            "Where the network is no better than no delighting or the delighter shading:",
-            *(shortfalls(results) or ["nowhere."]),
-            sep="\n",
-        )
-    if options.json is None:
-        print(json.dumps(results, indent=1))
+        results.setdefault(Path(name).name, {}).update(found)
+        figures.write_record(options.json, "delight", COMMAND, results)
+    print(table(results), "\nWhere the network is no better than no delighting or the delighter shading:", sep="\n")
+    print(*(shortfalls(results) or ["nowhere"]), sep="\n")
 
 
 def measure_rows(
@@ -130,13 +96,14 @@ def measure_rows(
 ) -> dict[str, dict]:
     """Score each row's answers to a set of photographs. One that a delighter refuses counts as it is.
 
-    features: whether the feature distance is measured, too; only: what the names of the rows begin with that are
-    asked for; None: all; picture: file that shows six photographs' answers beside each other. Returns Row ->
-    {pictures, refused, figures, groups, seconds_per_picture}, or {not_run: why}."""
+    features: measure the feature distance, too; only: beginnings of the names of the rows, None: all; picture: file
+    that shows six photographs' answers side by side. Returns row -> {pictures, refused, figures, groups,
+    seconds_per_picture}, or {not_run: why}.
+    """
     results, shown = {}, []
     spread = chosen.photographs[:: max(1, len(chosen.photographs) // 6)][:6]
     for row in rows(chosen, settings):
-        if only and not any(row.startswith(name) for name in only):
+        if only and not row.startswith(tuple(only)):
             continue
         scores, groups, delit, refused, alike, seconds, started = [], {}, {}, [], {}, 0.0, time.monotonic()
         try:
@@ -145,11 +112,12 @@ def measure_rows(
                 if isinstance(predicted, Problem):  # the artist would go on with the picture as it is
                     refused.append(predicted)
                     predicted = photograph.srgb
-                # scores the same under every light
-                flat = id(photograph.truth) if row == FLAT and photograph.truth.shadow is None else None
-                scores.append(alike.get(flat) or score_picture(predicted, photograph.srgb, photograph.truth, features))
+                truth = photograph.truth
+                # a flat tone scores the same under every light
+                flat = id(truth) if row == FLAT and truth.shadow is None else None
+                scores.append(alike.get(flat) or score_picture(predicted, photograph.srgb, truth, features))
                 alike |= {flat: scores[-1]} if flat else {}
-                groups.setdefault(photograph.group or tone_group(flat_tone(photograph.truth)), []).append(scores[-1])
+                groups.setdefault(photograph.group or tone_group(flat_tone(truth)), []).append(scores[-1])
                 delit[photograph.name] = predicted
                 print(f"\r{row}: {len(scores)}", end="", file=sys.stderr, flush=True)
                 started = time.monotonic()
@@ -168,15 +136,8 @@ def measure_rows(
         shown.append([_shown(delit[p.name], p) for p in spread])
     print(file=sys.stderr)
     if picture:
-        write_small(
-            picture,
-            sheet(
-                [
-                    [square(p.srgb, p.truth.face), _shown(p.truth.albedo, p), *delit]
-                    for p, *delit in zip(spread, *shown, strict=True)
-                ]
-            ),
-        )
+        known = [[square(p.srgb, p.truth.face), _shown(p.truth.albedo, p)] for p in spread]
+        write_small(picture, sheet([[*pair, *answers] for pair, *answers in zip(known, *shown, strict=True)]))
     return results
 
 
@@ -193,33 +154,25 @@ def rows(chosen: Photographs, settings: Settings) -> list[str]:
 
 def predictions(row: str, chosen: Photographs, settings: Settings) -> Iterator[tuple[Photograph, np.ndarray | Problem]]:
     """Yield each photograph with a row's albedo, sRGB [H, W, 3], or the problem that the delighter raised."""
-    if row in ("none", FLAT):
-        for photograph in chosen.photographs:
-            yield (
-                photograph,
-                photograph.srgb
-                if row == "none"
-                else np.broadcast_to(flat_tone(photograph.truth), photograph.srgb.shape),
-            )
-    elif row.endswith(", one photograph"):
-        for photograph in chosen.photographs:
-            try:
-                photographer = delight.PHOTOGRAPHERS[row.removesuffix(", one photograph")]
-                predicted = photographer(photograph.srgb, settings.delight)[0]
-            except Problem as problem:
-                predicted = problem
-            yield photograph, predicted
-    else:
+    name = row.removesuffix(", one photograph")
+    if name == row and row not in ("none", FLAT):
         by_frame = {photograph.frame: photograph for photograph in chosen.photographs}
         for delit in delight.DELIGHTERS[row](chosen.capture, settings, Reporter("delight")):
             if (photograph := by_frame.get(delit.view.name)) is not None:
                 height, width = photograph.srgb.shape[:2]
-                yield (
-                    photograph,
-                    delit.image
-                    if delit.image.shape[:2] == (height, width)
-                    else images.resize(delit.image, width, height),
-                )
+                same = delit.image.shape[:2] == (height, width)
+                yield photograph, delit.image if same else images.resize(delit.image, width, height)
+        return
+    for photograph in chosen.photographs:
+        predicted = photograph.srgb
+        if row == FLAT:
+            predicted = np.broadcast_to(flat_tone(photograph.truth), predicted.shape)
+        elif row != "none":
+            try:
+                predicted = delight.PHOTOGRAPHERS[name](predicted, settings.delight)[0]
+            except Problem as problem:
+                predicted = problem
+        yield photograph, predicted
 
 
 def _set(name: str, options: argparse.Namespace, captures: dict[str, str], work: Path) -> Photographs:

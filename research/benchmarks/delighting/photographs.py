@@ -88,34 +88,27 @@ class LightSeries:
 def main() -> int:
     parser = figures.command_line(__doc__, "photographs")
     parser.add_argument("--data", type=Path, default=SHARED)
-    parser.add_argument(
-        "--delighter", choices=[name for name in delight.PHOTOGRAPHERS if name != "none"], default="network"
-    )
-    parser.add_argument(
-        "--weights",
-        type=Path,
-        help="weights of our network, with their card beside them, instead of those that are shipped",
-    )
+    rivals = [name for name in delight.PHOTOGRAPHERS if name != "none"]
+    parser.add_argument("--delighter", choices=rivals, default="network")
+    parser.add_argument("--weights", type=Path, help="other weights of our network, with their card beside them")
     parser.add_argument("--sets", nargs="+", choices=TITLES, default=list(TITLES))
     parser.add_argument("--subjects", type=int, default=2, help="of each group of skin tone")
     options = parser.parse_args()
     if options.weights:
         importlib.import_module("core.stages.delight.network").WEIGHTS = options.weights
-    text, record = [], {}
+    record = {}
     for name in options.sets:
         try:
-            scores = (
-                of_pairs(options.subjects, options.delighter)
-                if name == "pairs"
-                else of_sitters(SITTERS[name](options.data), options.delighter)
-            )
+            if name == "pairs":
+                scores = of_pairs(options.subjects, options.delighter)
+            else:
+                scores = of_sitters(SITTERS[name](options.data), options.delighter)
         except Problem as problem:
-            text.append((TITLES[name], f"Not measured: {problem.problem} {problem.remedy}"))
+            print(f"{TITLES[name]}\n\nNot measured: {problem.problem} {problem.remedy}\n")
             continue
         found = summarise(scores, COLUMNS)
-        text.append((TITLES[name], format_table(found, COLUMNS, "answer")))
+        print(f"{TITLES[name]}\n\n{format_table(found, COLUMNS, 'answer')}\n")
         record[name] = to_record(found, scores)
-    print("\n\n".join(f"{heading}\n\n{body}" for heading, body in text))
     figures.write_record(options.json, "photographs", COMMAND, record, keep=True)
     return 0
 
@@ -158,12 +151,13 @@ def of_sitter(sitter: LightSeries, answers: list[np.ndarray]) -> dict[str, float
     """Return the figures of one answer to all of a sitter's pictures; answers linear [H, W, 3]."""
     true = images.linear_to_srgb(sitter.albedo)
     log_true, truths = log_green(true), [contrasts(true, sitter.landmarks, lit) for lit in sitter.lit]
-    shares, filmed = (
+    srgb, filmed = ([images.linear_to_srgb(np.clip(p, 0, 1)) for p in each] for each in (answers, sitter.linear))
+    shares, untouched = (
         [
-            contrast_kept(contrasts(images.linear_to_srgb(np.clip(picture, 0, 1)), sitter.landmarks, lit), truth)
+            contrast_kept(contrasts(picture, sitter.landmarks, lit), truth)
             for picture, lit, truth in zip(each, sitter.lit, truths, strict=True)
         ]
-        for each in (answers, sitter.linear)
+        for each in (srgb, filmed)
     )
     errors, slopes = [], []
     for i, j in combinations(range(len(answers)), 2):
@@ -171,24 +165,14 @@ def of_sitter(sitter: LightSeries, answers: list[np.ndarray]) -> dict[str, float
         if both.sum() > 1000:
             errors.append(disagreement([answers[i][both], answers[j][both]], sitter.albedo[both].mean(0)))
             slopes.append(slope((answers[i], answers[j]), (sitter.linear[i], sitter.linear[j]), both))
+    psnrs = [psnr_after_gain(a[lit], sitter.albedo[lit]) for a, lit in zip(answers, sitter.lit, strict=True)]
+    details = [detail(log_green(picture), log_true, lit) for picture, lit in zip(srgb, sitter.lit, strict=True)]
+    kept = {name: [one[name] for one in shares if name in one] for name in ("brows", "eyes", "lips", "chin")}
     return {
-        "psnr": float(
-            np.mean([psnr_after_gain(a[lit], sitter.albedo[lit]) for a, lit in zip(answers, sitter.lit, strict=True)])
-        ),
-        "detail": float(
-            np.mean(
-                [
-                    detail(log_green(images.linear_to_srgb(np.clip(a, 0, 1))), log_true, lit)
-                    for a, lit in zip(answers, sitter.lit, strict=True)
-                ]
-            )
-        ),
-        **{
-            f"kept_{name}": float(np.median([one[name] for one in shares if name in one]))
-            for name in ("brows", "eyes", "lips", "chin")
-            if any(name in one for one in shares)
-        },
-        **joint(shares, filmed),
+        "psnr": float(np.mean(psnrs)),
+        "detail": float(np.mean(details)),
+        **{f"kept_{name}": float(np.median(values)) for name, values in kept.items() if values},
+        **joint(shares, untouched),
         "agreement": to_decibels(float(np.mean(errors))) if errors else None,
         "light_slope": float(np.mean([s for s in slopes if s is not None])) if slopes else None,
     }

@@ -141,7 +141,7 @@ def main() -> int:
 def run_chain(capture: Capture, truth: Path) -> None:
     """Run the chain to the solve as far as it is not fresh; print the problem of a capture that fails."""
     try:
-        people.solve_person(capture, truth, "solve", "standard")
+        people.solve_person(capture, truth, "solve")
     except SystemExit as ended:
         print(f"{capture.root.stem}: {ended}", file=sys.stderr, flush=True)
 

@@ -92,45 +92,19 @@ def main() -> None:
     figures.write_record(options.json, "groomed", COMMAND, {"people": rows})
 
 
+COLUMNS = {
+    **{"true_hairs": "true hairs", "grown_hairs": "grown hairs", "true_mm": "true mm", "grown_mm": "grown mm"},
+    **{"iou": "IoU", "iou_anew": "anew", "amount": "amount", "amount_anew": "anew", "parser_iou": "parser"},
+    **{"degrees": "off, degrees", "usual_degrees": "off, usual"},
+}
+
+
 def to_table(rows: dict[str, dict]) -> str:
     """Return Markdown: a line for each part of each person."""
     lines = [
-        [
-            name,
-            part,
-            row["true_hairs"],
-            row["grown_hairs"],
-            row.get("true_mm"),
-            row.get("grown_mm"),
-            row["iou"],
-            row.get("iou_anew"),
-            row["amount"],
-            row.get("amount_anew"),
-            row["parser_iou"],
-            row.get("degrees"),
-            row.get("usual_degrees"),
-        ]
-        for name, parts in rows.items()
-        for part, row in parts.items()
+        [name, part, *(row.get(key) for key in COLUMNS)] for name, parts in rows.items() for part, row in parts.items()
     ]
-    return figures.markdown(
-        [
-            "person",
-            "part",
-            "true hairs",
-            "grown hairs",
-            "true mm",
-            "grown mm",
-            "IoU",
-            "anew",
-            "amount",
-            "anew",
-            "parser",
-            "off, degrees",
-            "off, usual",
-        ],
-        lines,
-    )
+    return figures.markdown(["person", "part", *COLUMNS.values()], lines)
 
 
 def shortfalls(rows: dict[str, dict]) -> str:
@@ -155,41 +129,25 @@ def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
     """Return the figures of one person, and a picture [H, W, 3]: frame, true hair, grown hair."""
     figure = make_figure(seed)
     views, seen = photograph(folder / str(seed), figure)
-    surface = lay_out(figure.head, SIZE)
+    surface, judged = lay_out(figure.head, SIZE), [views[k] for k in JUDGED]
     maps, shown = read_maps(figure, views, seen)
     found = hair.find(maps, surface, shown.shares[..., : len(GROWTHS)])
     cleaned, _ = hair.clean(maps, found, surface, seed)
     grown = grooming.groom(maps, found, cleaned, surface, seed)
     usual = grooming.groom(maps, found, cleaned, surface, seed, trust=USUAL_ALONE)
-    row = {}
-    true = {hairs.part: hairs for hairs in figure.strands}
-    for part in ("brows", "beard"):
-        if part in true or part in grown:
-            judged = [views[k] for k in JUDGED]
-            iou, amount = overlaps(figure, judged, true.get(part), grown.get(part))
-            row[part] = {
-                "true_hairs": _count(true.get(part)),
-                "grown_hairs": _count(grown.get(part)),
-                "iou": iou,
-                "amount": amount,
-                "parser_iou": _told(figure, shown, part),
-            }
-            if part in true:
-                row[part] |= dict(
-                    zip(
-                        ("iou_anew", "amount_anew"),
-                        overlaps(figure, judged, true[part], sow_anew(figure, part)),
-                        strict=True,
-                    )
-                )
-            if part in true and part in grown:
-                row[part] |= {
-                    "true_mm": _mean_mm(true[part]),
-                    "grown_mm": _mean_mm(grown[part]),
-                    "degrees": _off(true[part], grown[part], figure),
-                    "usual_degrees": _off(true[part], usual[part], figure),
-                }
-    return row, _picture(figure, views[VIEWS // 2], true, grown)
+    true, rows = {hairs.part: hairs for hairs in figure.strands}, {}
+    for part in (part for part in ("brows", "beard") if part in true or part in grown):
+        row = {"true_hairs": _count(true.get(part)), "grown_hairs": _count(grown.get(part))}
+        row["iou"], row["amount"] = overlaps(figure, judged, true.get(part), grown.get(part))
+        row["parser_iou"] = _told(figure, shown, part)
+        if part in true:
+            row["iou_anew"], row["amount_anew"] = overlaps(figure, judged, true[part], sow_anew(figure, part))
+        if part in true and part in grown:
+            row |= {"true_mm": _mean_mm(true[part]), "grown_mm": _mean_mm(grown[part])}
+            row["degrees"] = _off(true[part], grown[part], figure)
+            row["usual_degrees"] = _off(true[part], usual[part], figure)
+        rows[part] = row
+    return rows, _picture(figure, views[VIEWS // 2], true, grown)
 
 
 def try_trusts(folder: Path, seed: int) -> list[list]:

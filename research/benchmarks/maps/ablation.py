@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measure what each part of the solver is worth, on UV-space problems with known truth that no training saw.
 
-    python -m research.benchmarks.maps.ablation OUT.json [--rows NAME ...] [--subjects NAME ...] [--skins FOLDER]
+    python -m research.benchmarks.maps.ablation OUT.json [--rows NAME ...] [--skins FOLDER]
         [--kind raw|delit]
-                                  [--size 256] [--steps 20] [--jobs 2]
     python -m research.benchmarks.maps.ablation OUT.json --table [--json research/records/ablation.json]
     python -m research.benchmarks.maps.ablation OUT.json --picture docs/pictures/ablation.jpg
 
@@ -19,13 +18,12 @@ synthetic subjects only.
 import argparse
 import json
 import math
-import os
 import tempfile
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -34,6 +32,7 @@ import torch
 from skimage.color import deltaE_ciede2000, rgb2lab
 
 from core.capture.capture import Capture
+from core.capture.files import replacing
 from core.face.head import read_head
 from core.imaging import images
 from core.solver.lights import total_variation, update_lights
@@ -53,6 +52,8 @@ from .uv_problems import LEE_PERRY_SMITH, SHADOWS, MaskedUvProblem, make_problem
 
 SUBJECTS = ("9000", "9002", "9004", "9007", "9008", LEE_PERRY_SMITH.name if LEE_PERRY_SMITH.is_dir() else "9001")
 FACE_CROP, CELLS = 768, 96
+SIZE, STEPS, JOBS = 256, 20, 2
+"""Texels along a side, steps of every row that does not say otherwise, and processes."""
 FULL = "full method"
 KEY = (FULL, "without texel grid", "without prior", "grid on the whole face", "the texture itself")
 PICTURED = "without texel grid", "without prior", FULL
@@ -85,68 +86,56 @@ ROWS: dict[str, tuple[dict, int, str, bool]] = {
 }
 NAMED = {"recipe paper": "paper", "recipe released": "released"}
 TONES = (
-    (0.95, 0.80, 0.72),
-    (0.85, 0.67, 0.56),
-    (0.76, 0.57, 0.45),
-    (0.62, 0.43, 0.32),
-    (0.47, 0.31, 0.23),
-    (0.30, 0.20, 0.16),
+    *((0.95, 0.80, 0.72), (0.85, 0.67, 0.56), (0.76, 0.57, 0.45)),
+    *((0.62, 0.43, 0.32), (0.47, 0.31, 0.23), (0.30, 0.20, 0.16)),
 )
-"""sRGB, light to dark: asked for of one subject after the other, whatever its own is."""
+"""Tones that are requested, one of each subject, whatever its own is; sRGB, light to dark."""
+
+load_prior = cache(load)
 
 
 def main() -> None:
     parser = figures.command_line(__doc__, "ablation")
     parser.add_argument("out", type=Path)
     parser.add_argument("--rows", nargs="+", choices=tuple(ROWS), default=list(ROWS))
-    parser.add_argument("--subjects", nargs="+", default=list(SUBJECTS))
     parser.add_argument("--skins", type=Path)
     parser.add_argument("--kind", choices=("raw", "delit"), default="raw")
-    parser.add_argument("--size", type=int, default=256)
-    parser.add_argument("--steps", type=int, default=20, help="of every row that does not say otherwise")
-    parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--table", action="store_true", help="solve nothing, print what is there")
     parser.add_argument("--picture", type=Path, help="draw two subjects instead")
     options = parser.parse_args()
-    done = json.loads(options.out.read_text(encoding="utf-8")) if options.out.is_file() else {}
     if options.picture:
-        draw(options)
+        images.write_srgb(options.picture, draw(options.kind))
         return
+    done = json.loads(options.out.read_text(encoding="utf-8")) if options.out.is_file() else {}
     if not options.table:
         solve_all(options, done)
     found = summary({k: r for k, r in done.items() if "tone" not in r}, list(ROWS), FULL)
     print(table(found) + "\n\nSpread over the solver's seeds, dB:", found["spread"])
     differences = [r["tone"] for r in done.values() if "tone" in r]
     if differences:
-        found["tone"] = {"delivered": max(a for a, _ in differences), "sampled": max(b for _, b in differences)}
-        print(
-            "Skin tone, largest CIEDE2000 of the solved mean to the request over six tones, as delivered and by the "
-            "sampling alone:",
-            found["tone"],
-        )
+        found["tone"] = dict(zip(("delivered", "sampled"), map(max, zip(*differences, strict=True)), strict=True))
+        print("Largest CIEDE2000 of the solved skin's mean to the requested tone:", found["tone"])
     figures.write_record(options.json, "ablation", "python -m research.benchmarks.maps.ablation OUT.json", found)
 
 
 def solve_all(options: argparse.Namespace, done: dict) -> None:
     """Solve what is missing in `done`, and store it after each problem."""
-    subjects = [*options.subjects, *(_held_out(options.skins) if options.skins else [])]
     tasks = []
-    for i, subject in enumerate(subjects):
+    for i, subject in enumerate([*SUBJECTS, *(_held_out(options.skins) if options.skins else [])]):
         for j, shadows in enumerate(SHADOWS):
-            wanted = [(row, seed) for row in options.rows for seed in (0, 1) if _belongs(row, i, j, seed)]
+            solves = [(row, seed) for row in options.rows for seed in (0, 1) if _belongs(row, i, j, seed)]
             if j == i % 3 and i < len(TONES) and options.kind == "raw":
-                wanted.append((f"tone {i}", 0))
-            wanted = [(row, seed) for row, seed in wanted if _key(row, subject, shadows, options, seed) not in done]
-            if wanted:
-                tasks.append((subject, shadows, wanted))
-    with ProcessPoolExecutor(options.jobs, get_context("spawn")) as pool:
-        for future in as_completed([pool.submit(_solve_problem, *task, options) for task in tasks]):
+                solves.append((f"tone {i}", 0))
+            missing = [solve for solve in solves if _key(*solve, subject, shadows, options.kind) not in done]
+            if missing:
+                tasks.append((subject, shadows, options.kind, missing))
+    with ProcessPoolExecutor(JOBS, get_context("spawn")) as pool:
+        for future in as_completed([pool.submit(_solve_problem, *task) for task in tasks]):
             if future.exception():
                 pool.shutdown(cancel_futures=True)
             done.update(future.result())
-            temporary = options.out.with_name(f".{options.out.name}")
-            temporary.write_text(json.dumps(done, indent=0), encoding="utf-8")
-            os.replace(temporary, options.out)
+            with replacing(options.out) as temporary:
+                temporary.write_text(json.dumps(done, indent=0), encoding="utf-8")
             print(f"{len(done)} solves", flush=True)
 
 
@@ -167,30 +156,28 @@ def _held_out(folder: Path) -> list[str]:
     return [str(folder / f"{name}.png") for name in names]
 
 
-def _solve_problem(subject: str, shadows: str, solves: list[tuple[str, int]], options: argparse.Namespace) -> dict:
+def _solve_problem(subject: str, shadows: str, kind: str, solves: list[tuple[str, int]]) -> dict:
     torch.set_num_threads(1)
-    given, found = make_problem(subject, shadows, options.size, options.kind), {}
+    given, found = make_problem(subject, shadows, SIZE, kind), {}
     for row, seed in solves:
         began = time.monotonic()
-        about = {"row": row, "seed": seed, "problem": [Path(subject).stem, shadows, options.size, options.kind]}
+        about = {"row": row, "seed": seed, "problem": [Path(subject).stem, shadows, SIZE, kind]}
         if row.startswith("tone "):
-            about["tone"] = tone_error(given, TONES[int(row[5:])], options.steps)
+            about["tone"] = tone_error(given, TONES[int(row[5:])])
         else:
-            albedo = solve_row(given, row, seed, options.steps)
-            about |= {
-                "seconds": round(time.monotonic() - began, 1),
-                **measure_regions(albedo, given.albedo, given.face, given.regions()),
-            }
-        found[_key(row, subject, shadows, options, seed)] = about
+            solved = solve_row(given, row, seed)
+            about["seconds"] = round(time.monotonic() - began, 1)
+            about |= measure_regions(solved, given.albedo, given.face, given.regions())
+        found[_key(row, seed, subject, shadows, kind)] = about
     return found
 
 
-def solve_row(uv_problem: MaskedUvProblem, row: str, seed: int, steps: int) -> np.ndarray:
+def solve_row(uv_problem: MaskedUvProblem, row: str, seed: int) -> np.ndarray:
     """Solve a problem by one row's method with the true skin tone; linear albedo [S, S, 3]."""
     if row == "the texture itself":
         return uv_problem.texture
     changes, cells, mask, with_prior = ROWS[row]
-    recipe = RECIPES[NAMED[row]] if row in NAMED else replace(OURS, **{"steps": steps, **changes})
+    recipe = RECIPES[NAMED[row]] if row in NAMED else replace(OURS, **{"steps": STEPS, **changes})
     return solve_problem(uv_problem, recipe, uv_problem.tone, seed, cells, mask, with_prior)
 
 
@@ -207,7 +194,7 @@ def solve_problem(
 
     mask: what becomes of M: "painted", "empty" or "full"; with_prior: False: the texels follow the loss alone.
     Returns the albedo, linear [S, S, 3]."""
-    size, prior = len(uv_problem.albedo), _prior()
+    size, prior = len(uv_problem.albedo), load_prior()
     with tempfile.TemporaryDirectory() as folder:
         capture = Capture(folder)
         replace(
@@ -252,34 +239,28 @@ def fit_texels(
     return state
 
 
-def tone_error(uv_problem: MaskedUvProblem, tone: tuple[float, float, float], steps: int) -> tuple[float, float]:
+def tone_error(uv_problem: MaskedUvProblem, tone: tuple[float, float, float]) -> tuple[float, float]:
     """Return CIEDE2000 between a requested tone (sRGB) and the solved skin's mean, as delivered and as sampled."""
-    skin, found, asked = skin_weight(len(uv_problem.albedo)), [], SkinTone.from_srgb(tone, GIVEN)
+    skin, found, requested = skin_weight(len(uv_problem.albedo)), [], SkinTone.from_srgb(tone, GIVEN)
     for rescale in (OURS.rescale, "none"):
-        albedo = solve_problem(uv_problem, replace(OURS, steps=steps, rescale=rescale), asked)
-        mean = images.linear_to_srgb((albedo * skin[..., None]).sum((0, 1)) / skin.sum())
+        solved = solve_problem(uv_problem, replace(OURS, steps=STEPS, rescale=rescale), requested)
+        mean = images.linear_to_srgb((solved * skin[..., None]).sum((0, 1)) / skin.sum())
         found.append(round(float(deltaE_ciede2000(rgb2lab(mean), rgb2lab(np.array(tone)))), 3))
     return found[0], found[1]
 
 
-def draw(options: argparse.Namespace) -> None:
-    """Draw the texture, the rows PICTURED and the truth of two synthetic subjects."""
+def draw(kind: str) -> np.ndarray:
+    """Return the texture, the rows PICTURED and the truth of two synthetic subjects, sRGB."""
     lines = []
     for subject, shadows in (("9007", "leaves, hard"), ("9008", "edge, half soft")):
-        given = make_problem(subject, shadows, options.size, options.kind)
-        solves = [solve_row(given, row, 0, options.steps) for row in PICTURED]
-        pictures = [given.texture * (given.albedo.mean() / given.texture.mean()), *solves]
-        lines.append(np.hstack([*pictures, given.albedo]))
-    images.write_srgb(options.picture, images.linear_to_srgb(np.clip(np.vstack(lines), 0, 1)))
+        given = make_problem(subject, shadows, SIZE, kind)
+        texture = given.texture * (given.albedo.mean() / given.texture.mean())
+        lines.append(np.hstack([texture, *(solve_row(given, row, 0) for row in PICTURED), given.albedo]))
+    return images.linear_to_srgb(np.clip(np.vstack(lines), 0, 1))
 
 
-@lru_cache(maxsize=1)
-def _prior():
-    return load()
-
-
-def _key(row: str, subject: str, shadows: str, options: argparse.Namespace, seed: int) -> str:
-    return f"{row} | {Path(subject).stem} {shadows} {options.size} {options.kind} {options.steps} | seed {seed}"
+def _key(row: str, seed: int, subject: str, shadows: str, kind: str) -> str:
+    return f"{row} | {Path(subject).stem} {shadows} {SIZE} {kind} {STEPS} | seed {seed}"
 
 
 if __name__ == "__main__":

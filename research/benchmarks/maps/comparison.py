@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compare our light with other methods' light models, on delit and raw frames (the paper's protocol).
 
-    python -m research.benchmarks.maps.comparison FOLDER [--only NAME ...] [--scan CAPTURE TRUTH] [--size 512] [--jobs
-        2] [--json OUT.json]
+    python -m research.benchmarks.maps.comparison FOLDER [--only NAME ...] [--scan CAPTURE TRUTH]
+        [--json OUT.json]
 
 FOLDER was made and solved by research/benchmarks/captures/people.py; CAPTURE is a solved one of another subject, TRUTH
 its folder. Rows of INPUT: METHOD over one texture:
@@ -22,7 +22,7 @@ import json
 import shutil
 import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
 from multiprocessing import get_context
@@ -62,9 +62,11 @@ LIGHTS: dict[str, Callable] = {
     "environment": light_models.light_by_environment,
     "environment, no prior": light_models.light_by_environment,
 }
+load_prior = cache(load)
 METHODS = (OURS, *LIGHTS, "over its blur", "texture")
 FREE = "environment, no prior"
 FREE_UPDATES, FREE_SMOOTH = 200, 0.01
+SIZE, JOBS = 512, 2  # texels along a side, processes
 BLUR = 0.03  # deviation as a share of the map's side: keeps moles, takes a cheek's shading
 
 
@@ -73,50 +75,38 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="*", default=[p.name for p in PEOPLE])
     parser.add_argument("--scan", nargs=2, type=Path, metavar=("CAPTURE", "TRUTH"))
-    parser.add_argument("--size", type=int, default=512)
-    parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
     folder = options.folder.resolve()
     subjects = {name: (folder / f"{name}.wildcap", folder / name) for name in options.only}
     if options.scan:
         subjects["scan"] = tuple(path.resolve() for path in options.scan)
-    found = {}
-    with ProcessPoolExecutor(options.jobs, get_context("spawn")) as pool:
+    with ProcessPoolExecutor(JOBS, get_context("spawn")) as pool:
         running = {
-            pool.submit(compare_methods, *paths, folder / "comparison" / name, options.size): name
-            for name, paths in subjects.items()
+            name: pool.submit(compare_methods, *paths, folder / "comparison" / name) for name, paths in subjects.items()
         }
-        for future in as_completed(running):
-            found[running[future]] = future.result()
-            print(f"{running[future]} compared", flush=True)
-    found = {"size": options.size, "subjects": {name: found[name] for name in subjects}}
-    found |= (
-        {"people": means([rows for name, rows in found["subjects"].items() if name != "scan"])}
-        if set(found["subjects"]) - {"scan"}
-        else {}
-    )
-    found |= {"scan": means([found["subjects"]["scan"]])} if "scan" in subjects else {}
-    figures.write_record(
-        options.json, "comparison", "python -m research.benchmarks.maps.comparison FOLDER --scan CAPTURE TRUTH", found
-    )
-    print(f"{table(found)}\n\n{paired_table(found['subjects'])}")
+        compared = {name: future.result() for name, future in running.items()}
+    found = {"size": SIZE, "subjects": compared}
+    if people := [rows for name, rows in compared.items() if name != "scan"]:
+        found["people"] = means(people)
+    if "scan" in compared:
+        found["scan"] = means([compared["scan"]])
+    command = "python -m research.benchmarks.maps.comparison FOLDER --scan CAPTURE TRUTH"
+    figures.write_record(options.json, "comparison", command, found)
+    print(f"{table(found)}\n\n{paired_table(compared)}")
 
 
-def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[str, dict]:
+def compare_methods(source: Path, truth: Path, work: Path) -> dict[str, dict]:
     """Score all methods on one subject.
 
-    source: a capture with texture and mask; truth: folder of the true albedo, and of the tone that all are given;
-    work: takes each row's maps and scores; what is there is not solved again; size: of the maps, texels along a
-    side. Returns Input -> method -> seed -> figures."""
+    source: a capture with texture and mask; truth: folder of the true albedo, and of the tone that all are given; work:
+    takes each row's maps and scores, which are not made twice. Returns input -> method -> seed -> figures.
+    """
     torch.set_num_threads(1)
     found: dict[str, dict] = {given: {} for given in INPUTS}
     for given in INPUTS:
+        values = {"solve": {"skin_tone": skin_tone(truth), "size": SIZE}}
         settings = from_json(
-            {
-                "solve": {"skin_tone": skin_tone(truth), "size": size},
-                "delight": {"delighter": "none"} if given == "raw" else {},
-            },
-            preset("standard"),
+            values | ({"delight": {"delighter": "none"}} if given == "raw" else {}), preset("standard")
         )
         capture = Capture(source) if given == "delit" else _raw(Capture(source), work / "raw.wildcap", settings)
         seen = None
@@ -147,7 +137,7 @@ def solve_by_method(
     evidence = read_evidence(capture, head, settings.solve.size)
     if method in ("texture", "over its blur"):
         return *_by_hand(capture, evidence, settings, method), time.monotonic() - began
-    prior = _prior()
+    prior = load_prior()
     cell = evidence.cell_side(settings.solve.grid_cells)
     tone = read_given_tone(settings.solve.skin_tone)
     start = start_solve(
@@ -216,11 +206,6 @@ def _raw(source: Capture, folder: Path, settings: Settings) -> Capture:
         shutil.copytree(source.root, folder, ignore=later)
         run_stages(copy, settings, "delight", "texture", "shadow_mask")
     return copy
-
-
-@cache
-def _prior():
-    return load()
 
 
 if __name__ == "__main__":
