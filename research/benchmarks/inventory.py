@@ -125,8 +125,8 @@ def _zip_files() -> list[str]:
 
 def _listed(*options: str) -> set[str]:
     command = ["git", "ls-files", "-z", *options]
-    told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    return set(filter(None, told.split("\0")))
+    output = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    return set(filter(None, output.split("\0")))
 
 
 if __name__ == "__main__":

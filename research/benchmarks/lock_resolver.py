@@ -41,10 +41,10 @@ class Wheel:
 def resolve(name: str, direct: list[str], cuda: bool = False) -> dict[str, Wheel]:
     """Return package -> wheel for the lock `name`, with or without CUDA libraries. Raises Problem if one is missing."""
     environment, extras = environment_of(name), {}
-    wanted = {locks.normal(Requirement(text).name): {text} for text in direct}
+    requirements = {locks.normal(Requirement(text).name): {text} for text in direct}
     while True:
-        found = ask(name, sorted(text for texts in wanted.values() for text in texts))
-        before = sum(map(len, wanted.values()))
+        found = ask(name, sorted(text for texts in requirements.values() for text in texts))
+        before = sum(map(len, requirements.values()))
         for wheel in found.values():
             for need in map(Requirement, wheel.needs):
                 with_extras = [{**environment, "extra": extra} for extra in ("", *extras.get(wheel.name, ()))]
@@ -55,9 +55,9 @@ def resolve(name: str, direct: list[str], cuda: bool = False) -> dict[str, Wheel
                     and not cuda
                 ):
                     continue
-                wanted.setdefault(locks.normal(need.name), set()).add(f"{need.name}{need.specifier}")
+                requirements.setdefault(locks.normal(need.name), set()).add(f"{need.name}{need.specifier}")
                 extras.setdefault(locks.normal(need.name), set()).update(need.extras)
-        if sum(map(len, wanted.values())) == before:
+        if sum(map(len, requirements.values())) == before:
             return found
 
 
@@ -97,12 +97,19 @@ def environment_of(name: str) -> dict[str, str]:
         "macosx_arm64": ("Darwin", "darwin", "arm64", "posix"),
         "manylinux_x86_64": ("Linux", "linux", "x86_64", "posix"),
     }[platform]
-    full = f"{python}.0"
     return {
-        **{"platform_system": system, "sys_platform": short, "platform_machine": machine, "os_name": kind},
-        **{"python_version": python, "python_full_version": full, "implementation_version": full},
-        **{"implementation_name": "cpython", "platform_python_implementation": "CPython"},
-        **dict.fromkeys(("platform_release", "platform_version", "extra"), ""),
+        "platform_system": system,
+        "sys_platform": short,
+        "platform_machine": machine,
+        "os_name": kind,
+        "python_version": python,
+        "python_full_version": f"{python}.0",
+        "implementation_version": f"{python}.0",
+        "implementation_name": "cpython",
+        "platform_python_implementation": "CPython",
+        "platform_release": "",
+        "platform_version": "",
+        "extra": "",
     }
 
 
@@ -131,8 +138,8 @@ def _part(url: str, offset: int, size: int | None = None) -> tuple[bytes, int]:
         with open(path, "rb") as file:
             file.seek(offset % total)
             return file.read() if size is None else file.read(size), total
-    wanted = f"bytes={offset}" if offset < 0 else f"bytes={offset}-{'' if size is None else offset + size - 1}"
-    with urllib.request.urlopen(urllib.request.Request(url, headers={"Range": wanted}), timeout=30) as answer:
+    range_header = f"bytes={offset}" if offset < 0 else f"bytes={offset}-{'' if size is None else offset + size - 1}"
+    with urllib.request.urlopen(urllib.request.Request(url, headers={"Range": range_header}), timeout=30) as answer:
         found = re.fullmatch(r"bytes \d+-\d+/(\d+)", answer.headers.get("Content-Range", ""))
         if found is None:
             raise ValueError("it gives no parts of a file")

@@ -139,10 +139,12 @@ def _own_build(name: str, version: str, build: str, local: Wheel, compute: str) 
 def _linux_size(name: str, compute: str) -> tuple[int, int]:
     """Return the size of the index's build for Linux; other systems' CUDA builds hold the libraries."""
     linux = f"manylinux_x86_64-{name.rpartition('-')[2]}"
-    known = [size for pinned, size in locks.read(REQUIREMENTS, linux).sizes.items() if pinned.startswith("torch==")]
+    sizes_of_parts = [
+        size for pinned, size in locks.read(REQUIREMENTS, linux).sizes.items() if pinned.startswith("torch==")
+    ]
     if compute == "cuda":
-        known += locks.read(REQUIREMENTS, f"{linux}-cuda").sizes.values()
-    return tuple(map(sum, zip(*known, strict=True)))
+        sizes_of_parts += locks.read(REQUIREMENTS, f"{linux}-cuda").sizes.values()
+    return tuple(map(sum, zip(*sizes_of_parts, strict=True)))
 
 
 def _write(name: str, lines: list[str]) -> None:

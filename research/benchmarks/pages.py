@@ -31,8 +31,8 @@ def made_by(records: list[dict]) -> str:
     lines = []
     for record in records:
         machine = f"on {record['machine']}" if record.get("machine") else None
-        known = filter(None, [f"commit {record['commit'] or 'unknown'}", record.get("date"), machine])
-        lines.append(f"`{record['command']}`, {', '.join(known)}.")
+        parts = filter(None, [f"commit {record['commit'] or 'unknown'}", record.get("date"), machine])
+        lines.append(f"`{record['command']}`, {', '.join(parts)}.")
     return f"Made by {lines[0]}" if len(lines) == 1 else "Made by\n\n" + "\n".join(f"- {line}" for line in lines)
 
 

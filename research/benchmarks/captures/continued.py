@@ -14,11 +14,11 @@ from core.settings.settings import Settings
 def begin_at_delight(source: Capture, folder: Path) -> Capture:
     """Return a capture in place of whatever is in the folder: the frames, cameras and head of another one, no more."""
     shutil.rmtree(folder, ignore_errors=True)
-    begun = Capture(folder)
+    copy = Capture(folder)
     for part in (source.frames, source.cameras):
-        shutil.copytree(part, begun.root / part.name)
-    shutil.copyfile(source.head, begun.head)
-    return begun
+        shutil.copytree(part, copy.root / part.name)
+    shutil.copyfile(source.head, copy.head)
+    return copy
 
 
 def run_stages(capture: Capture, settings: Settings, *stages: str) -> None:

@@ -33,7 +33,7 @@ def photograph(folder: Path, figure: Figure) -> tuple[list[View], list[np.ndarra
     rng, taken = np.random.default_rng([seed, 91]), phone.sample_phone(seed)
     lamp = np.array([rng.uniform(-1, 1), -1, rng.uniform(0.2, 1)])
     lamp /= np.linalg.norm(lamp)
-    views, seen = [], []
+    views, colours = [], []
     for k, matrix in enumerate(scene.camera_path(seed, VIEWS)):
         path, albedo = folder / f"{k:05d}.png", folder / f"albedo_{k:05d}.npz"
         view = sample.view_of(matrix, SCALE)
@@ -49,8 +49,8 @@ def photograph(folder: Path, figure: Figure) -> tuple[list[View], list[np.ndarra
             with replacing(albedo) as temporary, open(temporary, "wb") as file:
                 np.savez_compressed(file, colour=colour.astype(np.float16))
         with np.load(albedo) as stored:
-            seen.append(stored["colour"].astype(np.float32))
-    return views, seen
+            colours.append(stored["colour"].astype(np.float32))
+    return views, colours
 
 
 def _look(world: Scene, view: View) -> tuple[np.ndarray, np.ndarray]:
@@ -76,8 +76,10 @@ def read_maps(figure: Figure, views: list[View], colours: list[np.ndarray]) -> t
     bare = images.resize(figure.skin.diffuse, SIZE, SIZE)
     diffuse = np.where(weights > 1e-4, np.exp(total / np.maximum(weights, 1e-9)), bare).astype(np.float32)
     one = np.ones((SIZE, SIZE), np.float32)
-    seen = np.clip(weights[..., 0], 0, 1).astype(np.float32)
-    maps = HeadMaps(diffuse, one[..., None] * [0, 0, 1], 0.35 * one, seen, np.repeat(one[..., None], 3, 2), seen)
+    confidence = np.clip(weights[..., 0], 0, 1).astype(np.float32)
+    maps = HeadMaps(
+        diffuse, one[..., None] * [0, 0, 1], 0.35 * one, confidence, np.repeat(one[..., None], 3, 2), confidence
+    )
     return maps, tell_parts(looks, surface, Reporter("texture"))
 
 

@@ -119,10 +119,10 @@ def face_of(data: Path, head: Mesh) -> np.ndarray:
         matrix = np.array(entry["matrix_world"])
         matrix[:3, 3] = matrix[:3, 3] * METRES - MIDDLE
         view = sample.view_of(matrix, record["width"] / scene.WIDTH)
-        seen = raster.visible_from(caster, head.vertices, normals, view.centre)
-        pixels, _ = view.project(head.vertices[seen])
+        visible = raster.visible_from(caster, head.vertices, normals, view.centre)
+        pixels, _ = view.project(head.vertices[visible])
         inside = ((pixels > 0) & (pixels < [view.width, view.height])).all(1)
-        rows = np.flatnonzero(seen)[inside]
+        rows = np.flatnonzero(visible)[inside]
         total[rows] += raster.sample(images.read_mask(path), pixels[inside])
         count[rows] += 1
     return total / np.maximum(count, 1)

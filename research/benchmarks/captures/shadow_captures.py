@@ -154,5 +154,5 @@ def render_picture(
     wall = cv2.resize(
         rng.uniform(0.02, 0.3, (9, 7, 3)).astype(np.float32), (view.width, view.height), interpolation=cv2.INTER_CUBIC
     )
-    seen = images.linear_to_srgb(cv2.GaussianBlur(head + (1 - cover)[..., None] * wall, (0, 0), 0.6))
-    return np.clip(seen + rng.normal(0, NOISE, seen.shape), 0, 1).astype(np.float32)
+    srgb = images.linear_to_srgb(cv2.GaussianBlur(head + (1 - cover)[..., None] * wall, (0, 0), 0.6))
+    return np.clip(srgb + rng.normal(0, NOISE, srgb.shape), 0, 1).astype(np.float32)

@@ -87,11 +87,11 @@ class Filmed:
         A person's own eyes and lashes are left out: the true frames have them painted on the lids, where an answer has
         lids that were completed from around.
         """
-        seen = [
+        confident = [
             images.resize(images.read_data(capture.texture_confidence)[..., 0], SIZE, SIZE) > SEEN
             for capture in (self.capture, self.true_capture)
         ]
-        face = (template.mask("face", SIZE) > 0.5) & seen[0] & seen[1]
+        face = (template.mask("face", SIZE) > 0.5) & confident[0] & confident[1]
         eyes = self.own_parts().get("eyes")
         if eyes is None:
             return face

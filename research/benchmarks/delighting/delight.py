@@ -40,8 +40,9 @@ from core.stages import delight
 from .. import figures
 from ..figures import SAMPLE, SHARED
 from ..measures.pictures import with_gain
+from ..measures.table import mean_of
 from ..pictures.sheet import write_small
-from .delight_measures import flat_tone, mean_of, score_picture, sheet, shortfalls, square, table, tone_group
+from .delight_measures import flat_tone, score_picture, sheet, shortfalls, square, table, tone_group
 from .delight_portraits import make_portraits
 from .delight_sets import Photograph, Photographs, light_stage, registered, select_true_frames
 
@@ -136,8 +137,8 @@ def measure_rows(
         shown.append([_shown(delit[p.name], p) for p in spread])
     print(file=sys.stderr)
     if picture:
-        known = [[square(p.srgb, p.truth.face), _shown(p.truth.albedo, p)] for p in spread]
-        write_small(picture, sheet([[*pair, *answers] for pair, *answers in zip(known, *shown, strict=True)]))
+        pairs = [[square(p.srgb, p.truth.face), _shown(p.truth.albedo, p)] for p in spread]
+        write_small(picture, sheet([[*pair, *answers] for pair, *answers in zip(pairs, *shown, strict=True)]))
     return results
 
 

@@ -147,9 +147,9 @@ def keep_answers(path: Path, capture: Capture, albedo: np.ndarray, known: np.nda
         answers.looks, evened, answers.fitted, put_together(answers), answers.skins, strict=True
     ):
         uv = interpolate(mesh.uvs, mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
-        seen = sample(maps, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * SIZE).reshape(*look.face.shape, 4)
-        where = (look.face >= 0) & (skin > BARE) & (seen[..., 3] > 0.99)
-        lights = look.log - seen[..., :3], look.shading, even.shading, fitted, final.shading
+        shown = sample(maps, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * SIZE).reshape(*look.face.shape, 4)
+        where = (look.face >= 0) & (skin > BARE) & (shown[..., 3] > 0.99)
+        lights = look.log - shown[..., :3], look.shading, even.shading, fitted, final.shading
         for key, light in zip(ANSWERS, lights, strict=True):
             cells[key].append(light[where])
     joined = {key: np.concatenate(parts) for key, parts in cells.items()}

@@ -78,14 +78,6 @@ def tone_group(srgb: np.ndarray) -> str:
     return next(name for name, above in TONES if angle > above or name == TONES[-1][0])
 
 
-def mean_of(scores: list[dict[str, float]]) -> dict[str, float | None]:
-    """Return the mean of each figure over the pictures that have it."""
-    return {
-        name: float(np.mean(known)) if (known := [s[name] for s in scores if not math.isnan(s[name])]) else None
-        for name in FIGURES
-    }
-
-
 def table(results: dict[str, dict]) -> str:
     """Return Markdown of set -> row -> {pictures, figures, groups}: a line per row, then one per row and group."""
     lines = []

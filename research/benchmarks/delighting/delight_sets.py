@@ -77,10 +77,10 @@ def select_true_frames(truth: Path, capture: Capture, work: Path, every: int = 1
     if not capture.head.is_file():
         raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
     copy = begin_at_delight(capture, work / "copy.wildcap")
-    known = {true.frame: true for true in read_truth(truth)}
+    truths = {true.frame: true for true in read_truth(truth)}
     listed = read_frames(copy)
     registered = {view.name: view for view in read_views(copy)}
-    having = [frame for frame in listed.records if frame.video_frame in known and frame.name in registered]
+    having = [frame for frame in listed.records if frame.video_frame in truths and frame.name in registered]
     if not having:
         raise Problem(
             f"No registered frame of {capture.root} has a true albedo in {truth}.",
@@ -91,7 +91,7 @@ def select_true_frames(truth: Path, capture: Capture, work: Path, every: int = 1
     write_frames(copy.frames, replace(listed, records=chosen))
     found = []
     for frame in having[::every]:
-        true = known[frame.video_frame]
+        true = truths[frame.video_frame]
         srgb = images.read_srgb(registered[frame.name].path)
         if srgb.shape != true.albedo.shape:
             srgb = images.resize(srgb, true.albedo.shape[1], true.albedo.shape[0])

@@ -29,10 +29,10 @@ from ..captures import people, state_captures
 from ..captures.state_captures import DELIT, METHODS, SOLVED, Filmed, add_captures, captures_asked
 from ..maps import albedo_score
 from ..maps.albedo_score import looks
-from ..measures.table import Column, Scores, format_table, summarise, to_record
+from ..measures.table import Column, Scores, format_table, mean_of, summarise, to_record
 from ..pages import prose
 from . import delight_measures, state_scores
-from .state_scores import Figures, in_pictures, in_uv, mean_of, of_person, small
+from .state_scores import Figures, in_pictures, in_uv, of_person, small
 
 COMMAND = "python -m research.benchmarks.delighting.state FOLDER"
 STAGES = ("delight", "texture", "shadow_mask", "solve")

@@ -19,6 +19,7 @@ from ..measures.pictures import detail, differences, face_box, log_green, shadow
 from ..measures.references import NOTHING, TRUE, face_height
 from ..measures.shared_light import fit_light, log_ratio, without_light
 from ..measures.slopes import slope
+from ..measures.table import mean, mean_of
 from ..measures.tone import psnr_after_gain
 from .delight_measures import stepping
 
@@ -108,7 +109,7 @@ def of_person(
         figures: Figures = {
             "light_shared": shared.deviation,
             "captures": len(chosen),
-            "psnr_shared": _mean(list(each_alone[method].values())),
+            "psnr_shared": mean(list(each_alone[method].values())),
         }
         everywhere = np.logical_and.reduce(places)
         if len(chosen) > 1 and everywhere.any():
@@ -119,18 +120,11 @@ def of_person(
             ]
             figures |= {
                 "agreement": agreement([maps[i][method][everywhere] for i in chosen], tone),
-                "light_slope": _mean(slopes),
+                "light_slope": mean(slopes),
             }
         figures |= joint(*([_kept(captures[i], maps[i], name) for i in chosen] for name in (method, NOTHING)))
         found[method] = figures
     return found, each_alone
-
-
-def mean_of(rows: list[Figures]) -> Figures:
-    """Return the mean of each figure over the rows that have it; None if none has."""
-    return {
-        name: _mean([row.get(name) for row in rows]) for name in dict.fromkeys(name for row in rows for name in row)
-    }
 
 
 def small(answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -151,8 +145,3 @@ def _kept(filmed: Filmed, maps: dict[str, np.ndarray], method: str) -> Figures:
 def _seen(look: HeadInView, answer: np.ndarray) -> np.ndarray:
     """Return a linear map as a look sees it, sRGB [H, W, 3]."""
     return images.linear_to_srgb(np.clip(look.picture(answer), 0, 1))
-
-
-def _mean(scores: list[float | None]) -> float | None:
-    known = [value for value in scores if value is not None and np.isfinite(value)]
-    return float(np.mean(known)) if known else None

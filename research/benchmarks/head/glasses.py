@@ -59,15 +59,15 @@ def rendered(work: Path, hdri: Path | None) -> dict:
     """Return the counts of the held-out figures' captures and pictures by kind of glasses."""
     people, panoramas = training.seeds(0)[1], read_panoramas(hdri)
     training.prepare(people, work, Reporter("glasses"))
-    told: dict[str, list] = {kind: [] for kind in (*glasses.KINDS, "none")}
+    captures_by_kind: dict[str, list] = {kind: [] for kind in (*glasses.KINDS, "none")}
     for person in people:
         for number, kind in enumerate((*glasses.KINDS, *["none"] * BARE)):
             rng = np.random.default_rng([3, person, number])
             sights = [training.read(work, person, view) for view in range(SEEN)]
             pair = None if kind == "none" else glasses.sample_glasses(sights[0].landmarks, rng, kind)
             pictures = [training.photograph_sight(sight, pair, rng, panoramas) for sight in sights]
-            told[kind].append([look(picture) for picture in pictures])
-    return {kind: counted(captures) for kind, captures in told.items()}
+            captures_by_kind[kind].append([look(picture) for picture in pictures])
+    return {kind: counted(captures) for kind, captures in captures_by_kind.items()}
 
 
 def counted(captures: list[list[float]]) -> dict:

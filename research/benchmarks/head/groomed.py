@@ -93,9 +93,17 @@ def main() -> None:
 
 
 COLUMNS = {
-    **{"true_hairs": "true hairs", "grown_hairs": "grown hairs", "true_mm": "true mm", "grown_mm": "grown mm"},
-    **{"iou": "IoU", "iou_anew": "anew", "amount": "amount", "amount_anew": "anew", "parser_iou": "parser"},
-    **{"degrees": "off, degrees", "usual_degrees": "off, usual"},
+    "true_hairs": "true hairs",
+    "grown_hairs": "grown hairs",
+    "true_mm": "true mm",
+    "grown_mm": "grown mm",
+    "iou": "IoU",
+    "iou_anew": "anew",
+    "amount": "amount",
+    "amount_anew": "anew",
+    "parser_iou": "parser",
+    "degrees": "off, degrees",
+    "usual_degrees": "off, usual",
 }
 
 
@@ -109,28 +117,28 @@ def to_table(rows: dict[str, dict]) -> str:
 
 def shortfalls(rows: dict[str, dict]) -> str:
     """Return the rows that miss the goals, and how often following the strokes is worth it."""
-    told = [(f"the {name} person's {part}", row) for name, parts in rows.items() for part, row in parts.items()]
-    known = [row for _, row in told if "degrees" in row]
-    thin = [f"{what} ({row['iou']:.2f})" for what, row in told if row["iou"] < WANTED_IOU]
+    parts_of_all = [(f"the {name} person's {part}", row) for name, parts in rows.items() for part, row in parts.items()]
+    with_directions = [row for _, row in parts_of_all if "degrees" in row]
+    thin = [f"{what} ({row['iou']:.2f})" for what, row in parts_of_all if row["iou"] < WANTED_IOU]
     off = [
         f"{what} ({row['degrees']:.0f} degrees)"
-        for what, row in told
+        for what, row in parts_of_all
         if "degrees" in row and row["degrees"] > WANTED_DEGREES
     ]
-    nearer = sum(row["degrees"] < row["usual_degrees"] for row in known)
+    nearer = sum(row["degrees"] < row["usual_degrees"] for row in with_directions)
     return (
         f"Below the IoU that is wanted: {', '.join(thin) or 'nothing'}; farther off: "
         f"{', '.join(off) or 'nothing'}. Hair that follows the strokes lies nearer to the true one than "
-        f"the usual directions alone in {nearer} of {len(known)} rows."
+        f"the usual directions alone in {nearer} of {len(with_directions)} rows."
     )
 
 
 def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
     """Return the figures of one person, and a picture [H, W, 3]: frame, true hair, grown hair."""
     figure = make_figure(seed)
-    views, seen = photograph(folder / str(seed), figure)
+    views, colours = photograph(folder / str(seed), figure)
     surface, judged = lay_out(figure.head, SIZE), [views[k] for k in JUDGED]
-    maps, shown = read_maps(figure, views, seen)
+    maps, shown = read_maps(figure, views, colours)
     found = hair.find(maps, surface, shown.shares[..., : len(GROWTHS)])
     cleaned, _ = hair.clean(maps, found, surface, seed)
     grown = grooming.groom(maps, found, cleaned, surface, seed)
@@ -153,8 +161,8 @@ def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
 def try_trusts(folder: Path, seed: int) -> list[list]:
     """Return for each part of a person the median error of directions in degrees for each of TRUSTS."""
     figure = make_figure(seed, SIZE)
-    views, seen = photograph(folder / str(seed), figure)
-    surface, (maps, shown) = lay_out(figure.head, SIZE), read_maps(figure, views, seen)
+    views, colours = photograph(folder / str(seed), figure)
+    surface, (maps, shown) = lay_out(figure.head, SIZE), read_maps(figure, views, colours)
     found = hair.find(maps, surface, shown.shares[..., : len(GROWTHS)])
     landmarks, rows = template.landmark_points(surface.mesh), []
     for true in (hairs for hairs in figure.strands if hairs.part in ("brows", "beard")):
@@ -231,8 +239,8 @@ def _told(figure: Figure, parts_shown: PartsShown, part: str) -> float:
     grows = (
         images.resize(figure.growth[part], SIZE, SIZE) > 0.25 if part in figure.growth else np.zeros((SIZE, SIZE), bool)
     )
-    told, grows = (where[parts_shown.judged] for where in (parts_shown.shares[..., GROWTHS.index(part)] > 0.5, grows))
-    return round(float((told & grows).sum() / max((told | grows).sum(), 1)), 3)
+    parsed, grows = (where[parts_shown.judged] for where in (parts_shown.shares[..., GROWTHS.index(part)] > 0.5, grows))
+    return round(float((parsed & grows).sum() / max((parsed | grows).sum(), 1)), 3)
 
 
 def _cover(figure: Figure, view: View, hairs: Strands | None) -> np.ndarray:

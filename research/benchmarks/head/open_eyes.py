@@ -122,10 +122,10 @@ def fit_alone(folder: Path) -> dict[str, dict]:
         closed = meshes.read_obj(capture.root / "truth" / "head.obj")
         true = lids.open_lids(closed, person["openness"], np.array(person["gaze"]))
         views, head = read_views(capture), meshes.read_obj(capture.head)
-        seen = landmarks.find(views, QUIET, 1.0)
-        marks = eyeballs.mark_rims(eye_looks.look(views, seen, QUIET), head, seen.opening, QUIET)
-        for name, told in (("", marks), (ALONE, (None, None))):
-            fitted = eyeballs.fit(head, told, seen.opening)
+        landmark_views = landmarks.find(views, QUIET, 1.0)
+        marks = eyeballs.mark_rims(eye_looks.look(views, landmark_views, QUIET), head, landmark_views.opening, QUIET)
+        for name, evidence in (("", marks), (ALONE, (None, None))):
+            fitted = eyeballs.fit(head, evidence, landmark_views.opening)
             colours = None if name else irises_over_own_skin(views, fitted, seed)
             for side, eye in enumerate(fitted.records()):
                 off = (
@@ -159,7 +159,7 @@ def compare_eye(eye: Eyeball, opened: np.ndarray, true: lids.OpenHead, side: int
     centre = scale * turn @ ball.centre + shift
     gaze = np.degrees(np.arccos(np.clip(turn @ ball.gaze @ np.array(eye.gaze), -1, 1)))
     iris = 1e3 * eye.iris_radius / scale - eyes.IRIS_MM if eye.iris_radius else None
-    told = (
+    figures = (
         1e3 * np.mean([off.mean() for off in rims]),
         1e3 * max(off.max() for off in rims),
         1e3 * np.linalg.norm(centre - eye.centre),
@@ -170,7 +170,7 @@ def compare_eye(eye: Eyeball, opened: np.ndarray, true: lids.OpenHead, side: int
         eye.openness,
         None,
     )
-    return dict(zip(COLUMNS, map(_plain, told), strict=True))
+    return dict(zip(COLUMNS, map(_plain, figures), strict=True))
 
 
 def true_iris(person: dict, radius: float) -> np.ndarray:

@@ -131,11 +131,11 @@ def of_capture(capture: Capture, subject: int | None = None) -> dict:
     surface = lay_out(read_head(capture).mesh, len(maps.diffuse))
     report = Reporter("upscale")
     done = complete(maps, surface, report)
-    seen = cv2.morphologyEx(
+    visible = cv2.morphologyEx(
         (maps.seen >= UNSEEN_CONFIDENCE).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8)
     )
-    seen = seen.astype(bool) | (template.mask("face", surface.size) > 0.5)
-    inside = (_distance(seen) - _distance(~seen)) * surface.texel
+    visible = visible.astype(bool) | (template.mask("face", surface.size) > 0.5)
+    inside = (_distance(visible) - _distance(~visible)) * surface.texel
     rings = [(inside > low) & (inside < high) for low, high in RINGS]
     found = hair.find(done, surface)
     tones = {}

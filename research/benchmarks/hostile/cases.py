@@ -21,12 +21,32 @@ from .mutations import VALUES, mutate
 CHEAP = {"cameras": 6, "scan": 5, "texture": 2, "shadow_mask": 2}
 """Stages that take little time, and how often they are tried for once of the others."""
 NAMES = (
-    *("Zoë et moi", "a b'c\"d", "-rf", "%s{0}$HOME`id`", "tab\there", "line\nbreak", ".hidden", "trailing. ", "CON"),
-    *("x" * 240, "日本語の顔", "📷", "..wildcap", os.fsdecode(b"caf\xe9"), os.fsdecode(b"\xff\xfe")),
+    "Zoë et moi",
+    "a b'c\"d",
+    "-rf",
+    "%s{0}$HOME`id`",
+    "tab\there",
+    "line\nbreak",
+    ".hidden",
+    "trailing. ",
+    "CON",
+    "x" * 240,
+    "日本語の顔",
+    "📷",
+    "..wildcap",
+    os.fsdecode(b"caf\xe9"),
+    os.fsdecode(b"\xff\xfe"),
 )
 SETTINGS = (
-    *("frames.views", "solve.skin_tone", "delight.delighter", "scan.voxel_mm", "none.such", "registration.template"),
-    *("", "seed", "frames"),
+    "frames.views",
+    "solve.skin_tone",
+    "delight.delighter",
+    "scan.voxel_mm",
+    "none.such",
+    "registration.template",
+    "",
+    "seed",
+    "frames",
 )
 SMALL = {"long_side": 320, "views": 3}
 

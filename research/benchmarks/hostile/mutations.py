@@ -13,10 +13,29 @@ import struct
 import zlib
 from pathlib import Path
 
-NUMBERS = "nan -nan inf -inf 1e30 -1e30 1e-310 -1 0 999999999999 1e999 x 1,5 0x10".split() + [""]
+NUMBERS = (*"nan -nan inf -inf 1e30 -1e30 1e-310 -1 0 999999999999 1e999 x 1,5 0x10".split(), "")
 VALUES = (
-    *(None, True, [], {}, "", "x", "../../etc/passwd", "..\\secret.jpg", "a\0b", "/tmp/there", -1, 0, 1e308),
-    *(float("nan"), float("inf"), 10**400, [[]], "\ud800", "<script>alert(1)</script>", "%s%n{0}", "ä" * 5000),
+    None,
+    True,
+    [],
+    {},
+    "",
+    "x",
+    "../../etc/passwd",
+    "..\\secret.jpg",
+    "a\0b",
+    "/tmp/there",
+    -1,
+    0,
+    1e308,
+    float("nan"),
+    float("inf"),
+    10**400,
+    [[]],
+    "\ud800",
+    "<script>alert(1)</script>",
+    "%s%n{0}",
+    "ä" * 5000,
 )
 """Values that take the place of a sound one in a JSON file."""
 COUNTS = (2**60, 2**63, 2**31 - 1, 2**32 - 1, 0, 1)

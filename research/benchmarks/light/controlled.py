@@ -57,14 +57,10 @@ COLUMNS = {
     "mole_contrast": ("mole contrast", 2),
 }
 
-GAP_HEAD = (
-    *("dB after one gain", "in the wild", "flash", "true frames", "gap to flash"),
-    *("moles, in the wild", "moles, flash", "moles, true frames"),
-)
-STUDIO_HEAD = (
-    *("dB after one gain", "texture", "solved", "the solve adds", "detail, texture", "detail, solved"),
-    *("proposed mask, % of the face", "seconds"),
-)
+GAP_HEAD = ["dB after one gain", "in the wild", "flash", "true frames", "gap to flash"]
+GAP_HEAD += [f"moles, {place}" for place in ("in the wild", "flash", "true frames")]
+STUDIO_HEAD = ["dB after one gain", "texture", "solved", "the solve adds", "detail, texture", "detail, solved"]
+STUDIO_HEAD += ["proposed mask, % of the face", "seconds"]
 
 
 def main() -> int:

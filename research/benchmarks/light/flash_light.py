@@ -96,8 +96,8 @@ def highlight(frames: list[Lit], surface: Unfolded) -> Highlight:
 
     Neighbours share the strength; the roughness of ROUGHNESSES with the least residual is taken.
     """
-    seen = [_observed(frame, surface) for frame in frames]
-    fits = [_fit(seen, roughness) for roughness in ROUGHNESSES]
+    samples = [_observed(frame, surface) for frame in frames]
+    fits = [_fit(samples, roughness) for roughness in ROUGHNESSES]
     best = min(range(len(fits)), key=lambda i: fits[i][1])
     return Highlight(fits[best][0], ROUGHNESSES[best])
 
@@ -125,17 +125,17 @@ def lobe(cosine: np.ndarray, roughness: float) -> np.ndarray:
 
 def _observed(frame: Lit, surface: Unfolded) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return each texel's unshaded colour [S, S, 3] in a frame, n.l [S, S], and its weight [S, S]."""
-    seen = observe(frame.view, hold(frame.unshaded), surface, 1.0)
+    observation = observe(frame.view, hold(frame.unshaded), surface, 1.0)
     burnt = cv2.dilate((images.linear_to_srgb(frame.linear).max(-1) > BURNT).astype(np.uint8), np.ones((5, 5))).astype(
         np.float32
     )
-    weight = seen.quality * (
-        cv2.remap(burnt, seen.pixels[..., 0] - 0.5, seen.pixels[..., 1] - 0.5, cv2.INTER_LINEAR) == 0
+    weight = observation.quality * (
+        cv2.remap(burnt, observation.pixels[..., 0] - 0.5, observation.pixels[..., 1] - 0.5, cv2.INTER_LINEAR) == 0
     )
     towards = frame.view.centre - surface.points
     cosine = np.zeros(surface.covered.shape, np.float32)
     cosine[surface.covered] = np.clip((towards * surface.normals).sum(1) / np.linalg.norm(towards, axis=1), 0, 1)
-    return np.exp(seen.log_colour), cosine, np.where(cosine > LEAST, weight, 0).astype(np.float32)
+    return np.exp(observation.log_colour), cosine, np.where(cosine > LEAST, weight, 0).astype(np.float32)
 
 
 def _fit(samples: list[tuple], roughness: float) -> tuple[np.ndarray, float]:

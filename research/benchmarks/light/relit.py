@@ -44,6 +44,7 @@ from ..captures.people import PEOPLE
 from ..captures.truth_files import write_maps
 from ..head.head_against_truth import pose_of_truth
 from ..measures.pictures import differences, face_box
+from ..measures.table import mean_of
 from .relit_maps import Worn, face_mask, read_rows, read_worn, worn_by, write_row
 from .relit_renders import MARGIN
 
@@ -205,7 +206,7 @@ def is_newer(picture: Path, capture: Capture, truth: Path) -> bool:
 def score(work: Path, lights: list[str], rows: list[str] = ROWS) -> dict[str, dict[str, dict]]:
     """Return light -> row -> PSNR, SSIM and FLIP over the face, and write SHOWN side by side to work/LIGHT.png."""
     face = images.read_data(work / "renders" / "face.exr")[..., 0] > 0.5
-    box, seen, found = face_box(face), rendered(face), {}
+    box, window, found = face_box(face), rendered(face), {}
     for light in lights:
         linear = {
             row: images.read_linear(work / "renders" / f"{row}_{Path(light).stem}.exr") for row in ("truth", *rows)
@@ -213,7 +214,7 @@ def score(work: Path, lights: list[str], rows: list[str] = ROWS) -> dict[str, di
         gain = exposure(linear["truth"], face)
         shown = {row: images.linear_to_srgb(picture * gain) for row, picture in linear.items()}
         images.write_srgb(
-            work / f"{Path(light).stem}.png", np.hstack([shown[row][seen] for row in SHOWN if row in shown])
+            work / f"{Path(light).stem}.png", np.hstack([shown[row][window] for row in SHOWN if row in shown])
         )
         found[light] = {row: differences(shown[row][box], shown["truth"][box], face[box]) for row in rows}
     return found
@@ -243,22 +244,16 @@ def side_by_side(pictures: list[np.ndarray]) -> np.ndarray:
 def mean_over_lights(figures_by_light: dict[str, dict[str, dict]]) -> dict[str, dict[str, float]]:
     """Return row -> figures, each the mean over the lights."""
     rows = next(iter(figures_by_light.values()))
-    return {
-        row: {
-            figure: float(np.mean([figures_by_light[light][row][figure] for light in figures_by_light]))
-            for figure in rows[row]
-        }
-        for row in rows
-    }
+    return {row: mean_of([found[row] for found in figures_by_light.values()]) for row in rows}
 
 
 def shortfall(rows: dict[str, dict[str, float]]) -> str:
     """Return the gains that miss the goal, in words; '' if none does."""
     gains = {row: rows["solved"]["psnr"] - rows[row]["psnr"] for row in ("raw", "delit")}
     return ", ".join(
-        f"{gains[row]:+.2f} dB over {row} where {asked:.1f} is asked for"
-        for row, asked in (("raw", OVER_RAW), ("delit", OVER_DELIT))
-        if gains[row] < asked
+        f"{gains[row]:+.2f} dB over {row} where {goal:.1f} is asked for"
+        for row, goal in (("raw", OVER_RAW), ("delit", OVER_DELIT))
+        if gains[row] < goal
     )
 
 

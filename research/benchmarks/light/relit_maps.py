@@ -109,9 +109,9 @@ def read_rows(capture: Capture, true: Worn) -> dict[str, Worn]:
 def write_row(folder: Path, capture: Capture, worn: Worn) -> None:
     """Write a capture with another one's head and record and these maps, for the add-on to open as solved."""
     row, record = Capture(folder), capture.read()
-    seen = _sized(images.read_data(capture.texture_confidence)[..., 0], len(worn.specular))
+    confidence = _sized(images.read_data(capture.texture_confidence)[..., 0], len(worn.specular))
     figures = record["stages"].get("upscale", {}).get("figures", {})
-    figures |= {"specular_mean": on_cheeks_and_forehead(worn.specular, seen)}
+    figures |= {"specular_mean": on_cheeks_and_forehead(worn.specular, confidence)}
     shutil.rmtree(folder, ignore_errors=True)
     row.maps.mkdir(parents=True)
     shutil.copyfile(capture.head, row.head)

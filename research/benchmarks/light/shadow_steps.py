@@ -40,9 +40,9 @@ HEAD = ["capture", "taken out", "seen", "left in truth", "LEFT of other people",
 def main() -> int:
     parser = figures.command_line(__doc__, "shadow_steps")
     add_captures(parser)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     rows = {}
-    for filmed in captures_asked(parser, asked):
+    for filmed in captures_asked(parser, options):
         rows[filmed.name] = measure(filmed)
         print(f"{filmed.name}: measured", file=sys.stderr, flush=True)
     for row in rows.values():
@@ -50,7 +50,7 @@ def main() -> int:
         row["left_of_others"] = float(np.sqrt(np.mean(np.square(others)))) if others else None
         row["taken"] = min(1.0, (row["left_of_others"] / row["seen_spread"]) ** 2) if others else None
     print(table(rows))
-    figures.write_record(asked.json, "shadow_steps", COMMAND, {"rows": rows})
+    figures.write_record(options.json, "shadow_steps", COMMAND, {"rows": rows})
     return 0
 
 
@@ -60,7 +60,7 @@ def measure(filmed: Filmed) -> dict:
     evidence = read_evidence(capture, read_filmed_head(capture), REFERENCE_TEXELS)
     tone = read_given_tone(people.skin_tone(filmed.truth))
     cell = evidence.cell_side(Settings().solve.grid_cells)
-    begun = start_solve(load(), evidence, tone.tensor, cell, OURS, make_head_cells)
+    start = start_solve(load(), evidence, tone.tensor, cell, OURS, make_head_cells)
     luminance = {
         name: np.log(
             np.maximum(
@@ -74,17 +74,17 @@ def measure(filmed: Filmed) -> dict:
             ("true", filmed.answer(TRUE)),
         )
     }
-    seen = np.log(find_remaining_light(evidence, begun).numpy().clip(0.05, 4)).mean(0)
+    remaining = np.log(find_remaining_light(evidence, start).numpy().clip(0.05, 4)).mean(0)
     weight = (evidence.weight * evidence.trust * evidence.skin).numpy()
     kinds = {
         "removed": luminance["filmed"] - luminance["delit"],
-        "seen": seen,
+        "seen": remaining,
         "left": luminance["delit"] - luminance["true"],
     }
     row, steps = {"person": filmed.person}, {}
     for kind, value in kinds.items():
         steps[kind], sure = border.measure_border_steps(
-            value.astype(np.float32), begun.alpha.numpy(), weight, evidence.texel
+            value.astype(np.float32), start.alpha.numpy(), weight, evidence.texel
         )
         row |= dict(zip((kind, f"{kind}_spread"), border.mean_and_deviation(steps[kind], sure), strict=True))
     about = {kind: steps[kind] - row[kind] for kind in ("seen", "left")}

@@ -65,9 +65,9 @@ def count_independent(points: np.ndarray, weights: np.ndarray, reach: float) -> 
 
     Their values are correlated by exp(-distance / reach).
     """
-    known = np.flatnonzero(weights > 0)
-    known = known[:: max(1, len(known) // POINTS)]
-    points, weights = points[known], weights[known]
+    rows = np.flatnonzero(weights > 0)
+    rows = rows[:: max(1, len(rows) // POINTS)]
+    points, weights = points[rows], weights[rows]
     apart = np.linalg.norm(points[:, None] - points[None], axis=-1)
     return float(weights.sum() ** 2 / (weights @ np.exp(-apart / reach) @ weights))
 

@@ -86,8 +86,12 @@ ROWS: dict[str, tuple[dict, int, str, bool]] = {
 }
 NAMED = {"recipe paper": "paper", "recipe released": "released"}
 TONES = (
-    *((0.95, 0.80, 0.72), (0.85, 0.67, 0.56), (0.76, 0.57, 0.45)),
-    *((0.62, 0.43, 0.32), (0.47, 0.31, 0.23), (0.30, 0.20, 0.16)),
+    (0.95, 0.80, 0.72),
+    (0.85, 0.67, 0.56),
+    (0.76, 0.57, 0.45),
+    (0.62, 0.43, 0.32),
+    (0.47, 0.31, 0.23),
+    (0.30, 0.20, 0.16),
 )
 """Tones that are requested, one of each subject, whatever its own is; sRGB, light to dark."""
 

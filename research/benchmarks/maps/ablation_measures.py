@@ -112,19 +112,19 @@ def table(figures: dict[str, dict]) -> str:
     if not figures[REGIONS[0]]:
         return "The first row was not solved yet."
     tables = []
-    known = [figure for figure in FIGURES[1:] if any(row[figure] is not None for row in figures[REGIONS[0]].values())]
+    columns = [figure for figure in FIGURES[1:] if any(row[figure] is not None for row in figures[REGIONS[0]].values())]
     for region in REGIONS:
         spread, first = figures["spread"][region], next(iter(figures[region]))
         tables.append(
             markdown(
-                [region, "problems x seeds", "PSNR", f"to {first}", *(TITLES[k] for k in known), "seconds"],
+                [region, "problems x seeds", "PSNR", f"to {first}", *(TITLES[k] for k in columns), "seconds"],
                 [
                     [
                         row,
                         f"{r['problems']} x {r['seeds']}",
                         f"{r['psnr']:.2f}",
                         "" if row == first else _compared(r["to_first"], spread),
-                        *(number(r[figure], 3) for figure in known),
+                        *(number(r[figure], 3) for figure in columns),
                         f"{r['seconds']:.0f}",
                     ]
                     for row, r in figures[region].items()

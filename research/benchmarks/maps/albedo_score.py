@@ -30,6 +30,7 @@ from core.imaging import images
 from ..captures.films import read_film
 from ..figures import command_line, markdown, number, write_record
 from ..measures.pictures import detail, differences, face_box, log_green, shadow_step, with_gain
+from ..measures.table import mean_of
 
 FINEST = 1024
 """Texels of a map's side that are looked up one by one: a texel is then a quarter of a millimetre, and no larger than a
@@ -86,8 +87,8 @@ def score_capture(capture: Capture, truth: Path) -> dict:
     albedo = averaged(
         images.read_srgb(next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists()))
     )
-    seen, missing = looks(capture, truth)
-    return {"frames_not_registered": missing, **score_map(albedo, seen)}
+    views, missing = looks(capture, truth)
+    return {"frames_not_registered": missing, **score_map(albedo, views)}
 
 
 def averaged(albedo: np.ndarray) -> np.ndarray:
@@ -106,19 +107,19 @@ def looks(capture: Capture, truth: Path) -> tuple[list[HeadInView], list[int]]:
     head, caster = whole.mesh, whole.caster
     frames = read_frames(capture).by_name
     views = {frames[view.name].video_frame: view for view in read_views(capture)}
-    seen, missing = [], []
+    found, missing = [], []
     for true in read_truth(truth):
         if true.frame not in views:
             missing.append(true.frame)
             continue
         face, bary, _ = raster.render_view(caster, views[true.frame], true.face.shape[1] / views[true.frame].width)
         hit = face >= 0
-        seen.append(HeadInView(true, hit, raster.interpolate(head.uvs, head.face_uvs, face[hit], bary[hit])))
-    if not seen:
+        found.append(HeadInView(true, hit, raster.interpolate(head.uvs, head.face_uvs, face[hit], bary[hit])))
+    if not found:
         raise Problem(
             "None of the frames with a known albedo was registered.", "Look at the cameras stage in the report."
         )
-    return seen, missing
+    return found, missing
 
 
 def score_map(albedo: np.ndarray, looks: list[HeadInView]) -> dict:
@@ -156,15 +157,9 @@ def compare(predicted: np.ndarray, true: AlbedoTruth, mask: np.ndarray) -> dict:
 
 
 def mean_scores(results: list[dict]) -> dict:
-    """Return the mean over frames of what `compare` gives."""
-    figures = {
-        kind: {name: float(np.mean([r[kind][name] for r in results])) for name in results[0][kind]}
-        for kind in ("raw", "gain")
-    }
-    for name in ("detail", "shadow_step"):
-        values = [r[name] for r in results if not math.isnan(r[name])]
-        figures[name] = float(np.mean(values)) if values else None
-    return figures
+    """Return the mean over frames of the figures of `compare`."""
+    pictured = {kind: mean_of([result[kind] for result in results]) for kind in ("raw", "gain")}
+    return {**pictured, **mean_of([{key: result[key] for key in ("detail", "shadow_step")} for result in results])}
 
 
 def rows(scores: dict[str, dict]) -> dict[str, dict]:

@@ -109,13 +109,13 @@ def compare_methods(source: Path, truth: Path, work: Path) -> dict[str, dict]:
             values | ({"delight": {"delighter": "none"}} if given == "raw" else {}), preset("standard")
         )
         capture = Capture(source) if given == "delit" else _raw(Capture(source), work / "raw.wildcap", settings)
-        seen = None
+        views = None
         for method in METHODS:
             for seed in SEEDS.get(method, (0,)) if given == "delit" else (0,):
                 row = find_row_folder(work, given, method, seed)
                 if not (row / "score.json").is_file():
-                    seen = seen or looks(capture, truth)[0]
-                    _keep(row, *solve_by_method(capture, settings, method, seed), seen)
+                    views = views or looks(capture, truth)[0]
+                    _keep(row, *solve_by_method(capture, settings, method, seed), views)
                 score = json.loads((row / "score.json").read_text(encoding="utf-8"))
                 found[given].setdefault(method, {})[str(seed)] = score
     return found

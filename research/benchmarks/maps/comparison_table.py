@@ -5,6 +5,7 @@
 import numpy as np
 
 from .. import figures
+from ..measures.table import mean
 
 INPUTS = ("delit", "raw")
 OURS = "wildcap"
@@ -31,7 +32,7 @@ def means(subjects: list[dict]) -> dict:
     out: dict = {
         given: {
             method: {
-                column: _mean([value(one[given][method]["0"]) for one in subjects]) for column, value in COLUMNS.items()
+                column: mean([value(one[given][method]["0"]) for one in subjects]) for column, value in COLUMNS.items()
             }
             for method in subjects[0][given]
         }
@@ -40,7 +41,7 @@ def means(subjects: list[dict]) -> dict:
     two = [one["delit"][OURS] for one in subjects]
     return out | {
         "spread": {
-            column: _mean([abs(value(s["0"]) - value(s["1"])) / 2 for s in two if value(s["0"]) is not None])
+            column: mean([abs(value(s["0"]) - value(s["1"])) / 2 for s in two if value(s["0"]) is not None])
             for column, value in COLUMNS.items()
         }
     }
@@ -103,17 +104,17 @@ def paired_table(subjects: dict[str, dict]) -> str:
     for given, methods in paired(subjects).items():
         for method, found in methods.items():
             line = [f"{given}: less {method}"]
-            for column, (mean, error) in found.items():
-                text, better = DIFFERENCES[column][2].format(mean, error), -mean if column == "FLIP" else mean
+            for column, (gain, error) in found.items():
+                text, better = DIFFERENCES[column][2].format(gain, error), -gain if column == "FLIP" else gain
                 line.append(f"**{text}**" if better > 2 * error else f"*{text}*" if better < -error else text)
             lines.append(line)
     return figures.markdown(["ours, person by person", *DIFFERENCES], lines)
 
 
 def _cell(column: str, figure: float | None, column_values: list[float | None], spread: float | None) -> str:
-    known = [_badness(column, v) for v in column_values if v is not None]
+    others = [_badness(column, v) for v in column_values if v is not None]
     text = _text(column, figure)
-    return f"**{text}**" if figure is not None and _badness(column, figure) <= min(known) + (spread or 0) else text
+    return f"**{text}**" if figure is not None and _badness(column, figure) <= min(others) + (spread or 0) else text
 
 
 def _badness(column: str, figure: float) -> float:
@@ -122,8 +123,3 @@ def _badness(column: str, figure: float) -> float:
 
 def _text(column: str, figure: float | None) -> str:
     return "-" if figure is None else FORMATS[column].format(figure)
-
-
-def _mean(scores: list[float | None]) -> float | None:
-    known = [v for v in scores if v is not None]
-    return float(np.mean(known)) if known else None

@@ -31,7 +31,7 @@ from ..captures.state_captures import SIZE, SOLVED, Filmed, add_captures, captur
 from ..measures.calibration import calibrate
 from ..measures.references import TRUE
 from ..measures.shared_light import log_ratio
-from ..measures.table import Column, Scores, format_table, summarise, to_record
+from ..measures.table import Column, format_table, mean_of, summarise, to_record
 from ..measures.tone import to_tone
 from ..pages import Sections, prose
 
@@ -63,15 +63,15 @@ class Errors:
 def main() -> int:
     parser = figures.command_line(__doc__, "confidence")
     add_captures(parser)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     captures = {
         filmed.name: read_errors(filmed)
-        for filmed in captures_asked(parser, asked)
+        for filmed in captures_asked(parser, options)
         if filmed.answer(SOLVED) is not None
     }
     record = measure(captures)
     print("\n\n".join(body for _, body in sections(record)))
-    figures.write_record(asked.json, "confidence", COMMAND, record)
+    figures.write_record(options.json, "confidence", COMMAND, record)
     return 0
 
 
@@ -98,7 +98,6 @@ def measure(captures: dict[str, Errors]) -> dict:
         if len(people) > 1
         else {}
     )
-    scores: Scores = {}
     rows: dict[str, dict[str, list[dict]]] = {}
     by_capture = {}
     for name, each in captures.items():
@@ -110,11 +109,9 @@ def measure(captures: dict[str, Errors]) -> dict:
             rows.setdefault(method, {}).setdefault(each.person, []).append(judged)
             if method == SHIPPED:
                 by_capture[name] = judged
-    for method, of_people in rows.items():
-        scores[method] = {
-            person: {measure: float(np.mean([row[measure] for row in found])) for measure in COLUMNS}
-            for person, found in of_people.items()
-        }
+    scores = {
+        method: {person: mean_of(found) for person, found in of_people.items()} for method, of_people in rows.items()
+    }
     fitted = fit_deviations(captures.values())
     return {
         **to_record(summarise(scores, COLUMNS), scores),

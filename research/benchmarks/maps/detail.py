@@ -85,13 +85,13 @@ def marks(rays: FaceRays, texture: np.ndarray) -> dict | None:
     colours = raster.sample(images.srgb_to_linear(texture), rays.at.reshape(-1, 2) * len(texture))
     linear = colours.reshape(*rays.hit.shape, 3) * rays.hit[..., None]
     whole = _shrunk(rays.hit.astype(np.float32))
-    known = rays.true.face & (whole > 0.99)
-    inner = cv2.erode((known & rays.bare).astype(np.uint8), np.ones((17, 17))) > 0
+    skin = rays.true.face & (whole > 0.99)
+    inner = cv2.erode((skin & rays.bare).astype(np.uint8), np.ones((17, 17))) > 0
     if inner.sum() < 500:
         return None
     greens = _shrunk(linear[..., 1]) / np.maximum(whole, 1e-6), images.srgb_to_linear(rays.true.albedo)[..., 1]
     logs = [np.log(np.maximum(green, 2e-3)) for green in greens]
-    logs = [np.where(known, log, log[known].mean()).astype(np.float32) for log in logs]
+    logs = [np.where(skin, log, log[skin].mean()).astype(np.float32) for log in logs]
     (pores, true_pores), (spots, true_spots) = ([_band(log, *sigmas) for log in logs] for sigmas in (PORE_PX, MOLE_PX))
     slopes = [_slope(spots, true_spots, y, x) for y, x in moles(true_spots, inner)]
     return {

@@ -82,15 +82,15 @@ def show_samples(options: argparse.Namespace) -> None:
     albedo = (draw_from_prior(prior, coords, tone)[:, :3] + 1) / 2
     pairs, ratios = [], []
     for (row, column), sampled, skin_tone in zip(corner, albedo, tone, strict=True):
-        known = []
+        patches = []
         for maps, own in zip(skins.maps[COARSE], skins.tones, strict=True):
             for left in (column, side - column - PATCH):
                 patch = (maps[:3, row : row + PATCH, left : left + PATCH].float() + 1) / 2 / own[:, None, None]
-                known.append(patch if left == column else patch.flip(2))
-        known = torch.stack(known)
-        distance = (known - sampled / skin_tone[:, None, None]).pow(2).mean((1, 2, 3)).sqrt()
-        nearest = known[int(distance.argmin())]
-        apart = (known - nearest).pow(2).mean((1, 2, 3)).sqrt()
+                patches.append(patch if left == column else patch.flip(2))
+        patches = torch.stack(patches)
+        distance = (patches - sampled / skin_tone[:, None, None]).pow(2).mean((1, 2, 3)).sqrt()
+        nearest = patches[int(distance.argmin())]
+        apart = (patches - nearest).pow(2).mean((1, 2, 3)).sqrt()
         ratios.append(float(distance.min() / apart[apart > 1e-4].min()))
         pairs.append(torch.cat([sampled, nearest * skin_tone[:, None, None]], 2).clamp(0, 1).permute(1, 2, 0).numpy())
     sheet = in_rows(pairs, 4)
@@ -111,12 +111,12 @@ def draw_from_prior(prior: Prior, coords: torch.Tensor, tone: torch.Tensor) -> t
 
     coords: [N, 2, P, P], where the windows lie; tone: [N, 3], linear, of the skins. Returns [N, 7, P, P] in the
     network's range."""
-    told = make_condition(coords, prior.octaves, prior.mean_face, prior.spread, tone, torch.zeros(len(tone)))
+    condition = make_condition(coords, prior.octaves, prior.mean_face, prior.spread, tone, torch.zeros(len(tone)))
     sigmas = [s for s in karras_sigmas(STEPS, 0.01, 80.0) if s <= FIRST_SIGMA]
     generator = torch.Generator().manual_seed(0)
-    x = told.mean + sigmas[0] * torch.randn(told.mean.shape, generator=generator)
+    x = condition.mean + sigmas[0] * torch.randn(condition.mean.shape, generator=generator)
     for s, s_next in zip(sigmas[:-1], sigmas[1:], strict=True):
-        clean = denoise(prior.network, x, torch.full((len(x),), s), told)
+        clean = denoise(prior.network, x, torch.full((len(x),), s), condition)
         s_down, s_up = ancestral_sigmas(s, s_next)
         x = x + (x - clean) / s * (s_down - s) + s_up * torch.randn(x.shape, generator=generator)
     return clean

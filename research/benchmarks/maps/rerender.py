@@ -25,6 +25,7 @@ from core.imaging import images
 from .. import figures
 from ..captures.people import PEOPLE
 from ..measures.pictures import differences, face_box, with_gain
+from ..measures.table import mean_of
 from .ablation_measures import feature_distance
 from .albedo_score import AlbedoTruth, HeadInView
 from .comparison import LIGHTS, OURS, find_row_folder
@@ -54,17 +55,12 @@ def main() -> None:
     options = parser.parse_args()
     people = {}
     for name in options.only:
-        views = delit_views(Capture(options.folder / f"{name}.wildcap"))
-        people[name] = {
-            row: score(rendering(options.folder / "comparison" / name, row), views) for row in (*ROWS, CEILING)
-        }
+        views, work = delit_views(Capture(options.folder / f"{name}.wildcap")), options.folder / "comparison" / name
+        people[name] = {row: score(rendering(work, row), views) for row in (*ROWS, CEILING)}
         print(name, json.dumps(people[name]), flush=True)
     found = {
         "people": people,
-        "mean": {
-            row: {figure: float(np.mean([rows[row][figure] for rows in people.values()])) for figure in cells}
-            for row, cells in next(iter(people.values())).items()
-        },
+        "mean": {row: mean_of([rows[row] for rows in people.values()]) for row in (*ROWS, CEILING)},
     }
     figures.write_record(options.json, "rerender", "python -m research.benchmarks.maps.rerender FOLDER", found)
     print(table(found))
@@ -106,34 +102,31 @@ def score(rendered: np.ndarray, views: list[DelitFrame]) -> dict[str, float]:
     for view in views:
         mask = view.look.true.face
         box = face_box(mask)
-        seen = images.linear_to_srgb(np.clip(view.look.picture(rendered), 0, 1))[box]
         picture, mask = view.picture[box], mask[box]
-        seen = with_gain(seen, picture, mask)
-        distance = feature_distance(seen * mask[..., None], picture * mask[..., None])
-        found.append(
-            {
-                **differences(seen, picture, mask),
-                **({} if distance is None else {"features": float(distance[mask].mean())}),
-            }
-        )
-    return {figure: round(float(np.mean([one[figure] for one in found])), 4) for figure in found[0]}
+        srgb = images.linear_to_srgb(np.clip(view.look.picture(rendered), 0, 1))[box]
+        srgb = with_gain(srgb, picture, mask)
+        found.append(differences(srgb, picture, mask))
+        distance = feature_distance(srgb * mask[..., None], picture * mask[..., None])
+        if distance is not None:
+            found[-1]["features"] = float(distance[mask].mean())
+    return {figure: round(value, 4) for figure, value in mean_of(found).items()}
 
 
 def table(record: dict) -> str:
     """Return Markdown: a line per row with means over people, beside the paper's figures for its own captures."""
-    known = [figure for figure in FORMATS if figure in record["mean"][OURS]]
+    columns = [figure for figure in FORMATS if figure in record["mean"][OURS]]
     lines = []
     for row, cells in record["mean"].items():
         paper = PAPER.get(row if row in PAPER else row.rsplit(" ", 1)[0])
         lines.append(
             [
                 f"**{row}**" if row == OURS else row,
-                *(FORMATS[figure].format(cells[figure]) for figure in known),
+                *(FORMATS[figure].format(cells[figure]) for figure in columns),
                 "{:.2f} dB, {:.4f}".format(*paper) if paper else None,
             ]
         )
     return figures.markdown(
-        ["mean of the people", *(TITLES[figure] for figure in known), "the paper's, on its own captures"], lines
+        ["mean of the people", *(TITLES[figure] for figure in columns), "the paper's, on its own captures"], lines
     )
 
 

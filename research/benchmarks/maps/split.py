@@ -38,9 +38,9 @@ from core.stages.solve.skin_tone import read_given_tone
 from .. import figures
 from ..captures import people
 from ..captures.state_captures import DELIT, SIZE, SOLVED, Filmed, add_captures, captures_asked
-from ..delighting.state_scores import in_uv, mean_of, of_person, small
+from ..delighting.state_scores import in_uv, of_person, small
 from ..measures.references import NOTHING, TRUE
-from ..measures.table import Column, Scores, format_table, summarise, to_record
+from ..measures.table import Column, Scores, format_table, mean_of, summarise, to_record
 from ..pages import Sections, prose
 
 COMMAND = "python -m research.benchmarks.maps.split FOLDER --json research/records/split.json"

@@ -67,11 +67,11 @@ def measure_rows(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS) ->
 def looks_of(capture: Capture, caster: raster.RayCaster, truth: Path) -> dict[str, FaceRays]:
     """Return frame name -> its rays' hits, of the registered frames with a true albedo."""
     frames = read_frames(capture).by_name
-    known = {true.frame: true for true in read_truth(truth)}
+    truths = {true.frame: true for true in read_truth(truth)}
     found = {
-        view.name: cast_face_rays(caster, view, known[frames[view.name].video_frame])
+        view.name: cast_face_rays(caster, view, truths[frames[view.name].video_frame])
         for view in read_views(capture)
-        if frames[view.name].video_frame in known
+        if frames[view.name].video_frame in truths
     }
     if not found:
         raise Problem(
@@ -92,8 +92,8 @@ def _texture(row: str, observations: list, surface) -> np.ndarray:
     """Return a row's map, sRGB [S, S, 3]. The observations are used up."""
     if row == "average":
         linear = weighted_mean([np.exp(o.log_colour) for o in observations], [o.weight for o in observations])
-        seen = 1 - np.prod([1 - o.quality for o in observations], axis=0)
-        confidence = np.where(surface.covered, seen, 0).astype(np.float32)
+        share = 1 - np.prod([1 - o.quality for o in observations], axis=0)
+        confidence = np.where(surface.covered, share, 0).astype(np.float32)
     else:
         settings = from_json({"texture": {"perceptual": STEPS if row == "perceptual" else 0}})
         built = texture.build(observations, surface, settings, Reporter("texture"), aligned=row != "blend")
@@ -104,10 +104,10 @@ def _texture(row: str, observations: list, surface) -> np.ndarray:
 def score(map_: np.ndarray, frames: Iterable[FaceRays]) -> dict:
     """Return the figures of a map, sRGB [S, S, 3], by albedo_score and detail, means over the frames."""
     scores, found = [], []
-    for seen in frames:
-        predicted, hit = centre_rays(seen, map_)
-        scores.append(compare(predicted, seen.true, seen.true.face & hit))
-        found.append(marks(seen, map_))
+    for rays in frames:
+        predicted, hit = centre_rays(rays, map_)
+        scores.append(compare(predicted, rays.true, rays.true.face & hit))
+        found.append(marks(rays, map_))
     mean = mean_scores(scores)
     return {
         **mean["raw"],

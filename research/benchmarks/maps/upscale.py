@@ -44,6 +44,8 @@ from ...people.skin import make_skin
 from ...training.fine_windows import CHANNELS, FACTOR, Degradation, degraded, prepare
 from ..captures.shadow_captures import render_picture, write_views
 from ..figures import command_line, markdown, write_record
+from ..measures.table import mean_of
+from ..pictures.sheet import in_rows
 from .ablation_measures import feature_distance
 from .detail import moles
 
@@ -62,56 +64,40 @@ def main() -> None:
     parser = command_line(__doc__, "upscale")
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_upscale_benchmark")
     parser.add_argument("--picture", type=Path, help="close-ups of small map, Lanczos, network and truth side by side")
-    arguments = parser.parse_args()
-    arguments.work.mkdir(parents=True, exist_ok=True)
-    found = {"enlarging": enlarging(arguments.work, arguments.picture), "frames": from_frames(arguments.work)}
+    options = parser.parse_args()
+    options.work.mkdir(parents=True, exist_ok=True)
+    found = {"enlarging": enlarging(options.work, options.picture), "frames": from_frames(options.work)}
     # each in a fresh process, whose peak is its own
     with ProcessPoolExecutor(1, mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:
         found["cost"] = dict(zip(METHODS, pool.map(cost, METHODS), strict=True))
-    for name, rows in found.items():
+    record = {}
+    for part, rows in found.items():
         columns = next(iter(rows.values()))
-        print(
-            markdown(
-                [name, *columns],
-                [[row, *(f"{values[column]:.4g}" for column in columns)] for row, values in rows.items()],
-            ),
-            end="\n\n",
-        )
-    if arguments.json:
-
-        def keys(figures_by_name: dict[str, float]) -> dict[str, float]:
-            return {figure.lower().replace(" ", "_"): value for figure, value in figures_by_name.items()}
-
-        keyed = {
-            part: {row.replace("lanczos", "Lanczos"): keys(values) for row, values in rows.items()}
-            for part, rows in found.items()
+        lines = [[row, *(f"{values[column]:.4g}" for column in columns)] for row, values in rows.items()]
+        print(markdown([part, *columns], lines), end="\n\n")
+        record[part] = {
+            row.replace("lanczos", "Lanczos"): {key.lower().replace(" ", "_"): value for key, value in values.items()}
+            for row, values in rows.items()
         }
-        write_record(arguments.json, "upscale", "python -m research.benchmarks.maps.upscale", keyed, keep=True)
+    write_record(options.json, "upscale", "python -m research.benchmarks.maps.upscale", record, keep=True)
 
 
 def enlarging(work: Path, sheet: Path | None = None) -> dict[str, dict[str, float]]:
     """Return figures per kind of reduction and method, means over the subjects' windows."""
     prepare(list(SEEDS), VIEWS, work, Reporter("upscale"), 1)
-    found, shots = {}, []
+    rows, shots = {}, []
     for kind, how in KINDS.items():
-        scores = {method: [] for method in METHODS}
-        for seed in SEEDS:
-            for view in range(VIEWS):
-                large = np.load(work / f"window_{seed}_{view}.npy").astype(np.float32)
-                small = degraded(large, how, np.random.default_rng([seed, view]))
-                true = np.moveaxis(large, 0, -1)
-                results = {method: _enlarged(small, method) for method in scores}
-                for method, result in results.items():
-                    scores[method].append(compare(result, true))
-                if view == 0 and kind == "soft":
-                    shots.append(_closeup(small, {method: results[method] for method in METHODS}, true))
-        found |= {
-            f"{kind}, {method}": {name: round(float(np.mean([s[name] for s in rows])), 4) for name in rows[0]}
-            for method, rows in scores.items()
-        }
+        for seed, view in ((seed, view) for seed in SEEDS for view in range(VIEWS)):
+            large = np.load(work / f"window_{seed}_{view}.npy").astype(np.float32)
+            small, true = degraded(large, how, np.random.default_rng([seed, view])), np.moveaxis(large, 0, -1)
+            results = {method: _enlarged(small, method) for method in METHODS}
+            for method, result in results.items():
+                rows.setdefault(f"{kind}, {method}", []).append(compare(result, true))
+            if view == 0 and kind == "soft":
+                shots.append(_closeup(small, results, true))
     if sheet:
-        images.write_srgb(sheet, np.vstack([np.hstack(shots[:2]), np.hstack(shots[2:4])]), quality=86)
-    return found
+        images.write_srgb(sheet, in_rows(shots[:4], 2), quality=86)
+    return {name: rounded_mean(found) for name, found in rows.items()}
 
 
 def compare(result: np.ndarray, true: np.ndarray) -> dict[str, float]:
@@ -179,20 +165,20 @@ def from_frames(work: Path) -> dict[str, dict[str, float]]:
     rows: dict[str, list] = {}
     for seed in FILMED:
         capture, true = filmed(seed, work / f"filmed_{seed}.wildcap")
-        small = _stacked(true)
-        solved = degraded(small, replace(KINDS["soft"], relief=1.0), np.random.default_rng(seed))
-        seen = cv2.resize(images.read_mask(capture.texture_confidence), (len(true),) * 2) > 0.5
-        seen &= template.mask("face", 1024).repeat(2, 0).repeat(2, 1) > 0.5
+        solved = degraded(_stacked(true), replace(KINDS["soft"], relief=1.0), np.random.default_rng(seed))
+        visible = cv2.resize(images.read_mask(capture.texture_confidence), (len(true),) * 2) > 0.5
+        visible &= template.mask("face", 1024).repeat(2, 0).repeat(2, 1) > 0.5
         for method in METHODS:
             plain = images.resize(_enlarged(solved, method)[..., :3], *true.shape[1::-1])
             guided = plain.copy()
             detail.guide(guided, images.read_data(capture.texture_detail), 1024, lambda done: None)
             for name, albedo in ((method, plain), (f"{method}, with the frames", guided)):
-                rows.setdefault(name, []).append(_fine_figures(albedo, true, seen))
-    return {
-        name: {figure: round(float(np.mean([r[figure] for r in found])), 4) for figure in found[0]}
-        for name, found in rows.items()
-    }
+                rows.setdefault(name, []).append(_fine_figures(albedo, true, visible))
+    return {name: rounded_mean(found) for name, found in rows.items()}
+
+
+def rounded_mean(rows: list[dict[str, float]]) -> dict[str, float]:
+    return {figure: round(value, 4) for figure, value in mean_of(rows).items()}
 
 
 def filmed(seed: int, folder: Path) -> tuple[Capture, np.ndarray]:

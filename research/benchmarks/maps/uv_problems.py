@@ -102,8 +102,8 @@ def make_problem(subject: str, shadows: str, size: int, kind: str = "raw") -> Ma
         kept = 1 - rng.uniform(0.3, 0.6) * (1 - kept)
     lit = albedo * shading * kept
     lit *= 0.8 / np.percentile(lit[face].max(-1), 99.5)
-    seen = cv2.GaussianBlur(lit, (3, 3), 0.5) + rng.normal(0, NOISE, lit.shape)
-    return MaskedUvProblem(albedo, np.maximum(seen, 0).astype(np.float32), shadow, _painted(shadow))
+    filmed = cv2.GaussianBlur(lit, (3, 3), 0.5) + rng.normal(0, NOISE, lit.shape)
+    return MaskedUvProblem(albedo, np.maximum(filmed, 0).astype(np.float32), shadow, _painted(shadow))
 
 
 def skin_weight(size: int) -> np.ndarray:
@@ -189,8 +189,8 @@ def _painted(shadow: np.ndarray) -> np.ndarray:
 def _sh_part(shading: np.ndarray, normal: np.ndarray, face: np.ndarray) -> np.ndarray:
     """Return the second-order SH of the normals that are nearest to a shading on the face, [S, S, 3]."""
     basis = shading_basis(torch.from_numpy(np.ascontiguousarray(normal.transpose(2, 0, 1), np.float32)))
-    wanted = torch.from_numpy(np.ascontiguousarray(shading.transpose(2, 0, 1), np.float32))
-    gamma = fit_global(wanted, torch.ones_like(wanted), basis, torch.from_numpy(face.astype(np.float32)), ridge=1e-4)
+    target = torch.from_numpy(np.ascontiguousarray(shading.transpose(2, 0, 1), np.float32))
+    gamma = fit_global(target, torch.ones_like(target), basis, torch.from_numpy(face.astype(np.float32)), ridge=1e-4)
     fitted = torch.einsum("ck,khw->hwc", gamma, basis).numpy()
     return np.maximum(fitted, 0.02 * fitted[face].mean())
 

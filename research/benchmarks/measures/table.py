@@ -46,15 +46,15 @@ def summarise(scores: Scores, columns: dict[str, Column], against: str | None = 
     for method, people in scores.items():
         other = scores.get(against, {}) if against not in (None, method) else {}
         for measure in columns:
-            known = {person: value for person, row in people.items() if _is_known(value := row.get(measure))}
-            if not known:
+            values_by_person = {person: value for person, row in people.items() if _is_known(value := row.get(measure))}
+            if not values_by_person:
                 continue
             pairs = [
                 value - theirs
-                for person, value in known.items()
+                for person, value in values_by_person.items()
                 if _is_known(theirs := other.get(person, {}).get(measure))
             ]
-            values = list(known.values())
+            values = list(values_by_person.values())
             found.setdefault(method, {})[measure] = Cell(
                 float(np.mean(values)),
                 _deviation(values),
@@ -140,6 +140,17 @@ def _difference_text(cell: Cell | None, column: Column) -> str | None:
 
 def _deviation(scores: list[float]) -> float | None:
     return float(np.std(scores, ddof=1)) if len(scores) > 1 else None
+
+
+def mean(values: list[float | None]) -> float | None:
+    """Return the mean of the finite values, None if there are none."""
+    finite = [value for value in values if _is_known(value)]
+    return float(np.mean(finite)) if finite else None
+
+
+def mean_of(rows: list[dict[str, float | None]]) -> dict[str, float | None]:
+    """Return the mean of each figure over the rows that have it, None if none has."""
+    return {name: mean([row.get(name) for row in rows]) for name in dict.fromkeys(name for row in rows for name in row)}
 
 
 def _is_known(figure: float | None) -> bool:

@@ -52,7 +52,7 @@ def run_closeups(module: str, description: str, shots: Shots, resolution: int, s
 
     shots: name of a person -> name of a picture -> its content; resolution: default pixels of a side.
     """
-    parser = command_line(__doc__)
+    parser = command_line(description)
     parser.add_argument("folder", type=Path, help="keeps captures and renders; finished renders are taken as they are")
     parser.add_argument("out", type=Path)
     parser.add_argument("--only", nargs="+", metavar="NAME", help="of the six people")

@@ -37,8 +37,8 @@ def shots(name: str) -> dict[str, CloseUp]:
     number = [person.name for person in PEOPLE].index(name)
     light, iris = LIGHTS[number % len(LIGHTS)], IRISES[number]
     return {
-        face: CloseUp(light, engine=ENGINES[(number + place) % 2], close_up=True, iris=iris, **told)
-        for place, (face, told) in enumerate(FACES.items())
+        face: CloseUp(light, engine=ENGINES[(number + place) % 2], close_up=True, iris=iris, **content)
+        for place, (face, content) in enumerate(FACES.items())
     }
 
 

@@ -67,10 +67,10 @@ def _shaded(caster: raster.RayCaster, view: View, scale: float) -> np.ndarray:
 
 def _wires(mesh: meshes.Mesh, caster: raster.RayCaster, view: View, frame: np.ndarray, scale: float) -> np.ndarray:
     edges = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    seen = raster.visible_from(caster, mesh.vertices, meshes.vertex_normals(mesh), view.centre)
+    visible = raster.visible_from(caster, mesh.vertices, meshes.vertex_normals(mesh), view.centre)
     pixels = view.project(mesh.vertices)[0] * scale - 0.5
     canvas = np.ascontiguousarray(frame)
-    lines = [np.round(line * 16).astype(np.int32) for line in pixels[edges[seen[edges].all(1)]]]
+    lines = [np.round(line * 16).astype(np.int32) for line in pixels[edges[visible[edges].all(1)]]]
     layer = canvas.copy()
     cv2.polylines(layer, lines, False, (0.2, 0.9, 1.0), 1, cv2.LINE_AA, 4)
     return 0.6 * canvas + 0.4 * layer

@@ -8,9 +8,8 @@ from ..captures import likenesses, scan_captures
 from ..captures.state_captures import DELIT, SOLVED
 from ..delighting import state
 from ..delighting.delight_measures import shortfalls, table
-from ..delighting.state_scores import mean_of
 from ..figures import Figures
-from ..measures.table import Scores, format_table, summarise
+from ..measures.table import Scores, format_table, mean_of, summarise
 from ..pages import Sections, prose
 
 TITLE = "Delighters"

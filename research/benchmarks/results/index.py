@@ -119,8 +119,7 @@ def headline(of: Figures) -> str:
         f"""
         The true skin tone is given to all; in the first column each picture gets one gain
         per channel on top. On sample and scan the filmed frames stand for their texture. A face takes
-        [{costs.standard.together.minutes:.1f} minutes on 2 cores](costs.md), of 300 frames
-        {costs["frames-300"].together.minutes:.1f}.
+        [{costs.standard.together.minutes:.1f} minutes on 2 cores](costs.md).
         """,
     )
 
@@ -163,7 +162,8 @@ def worse_in_the_picture(gains: dict[str, float]) -> str:
 
 
 def the_synthetic(people: Iterable[str]) -> str:
-    """Return the number of people of captures/likenesses.py, and of captures/people.py."""
+    """Return how many people are of research/benchmarks/captures/likenesses.py, and how many of
+    research/benchmarks/captures/people.py."""
     made = [name for name in people if not is_scanned(name)]
     bald = [name for name in made if is_bald(name)]
     kinds = [(len(made) - len(bald), "with strands, eyes and a phone's pipeline"), (len(bald), "bald, by true cameras")]
