@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Time and memory of the whole chain, stage by stage.
 
-    python -m research.benchmarks.costs WORK [--rows standard draft frames-300] [--film VIDEO] --json
-    research/records/costs.json
+    python -m research.benchmarks.costs WORK --json research/records/costs.json
 
-Each stage is a `python -m core run` of its own. "standard" goes from the sample video to the delivery; "draft" starts
-from a copy of its cameras; "frames-300" is the whole chain on 300 frames of --film.
+Each stage is run by a worker of its own. WORK is a new folder, which gets two captures of the sample video: one
+of the standard quality, from the video to the delivery, and a draft, which goes on from a copy of its cameras.
 """
 
 from __future__ import annotations
@@ -20,74 +19,70 @@ import time
 from pathlib import Path
 
 from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.messages import Done, from_line
+from core.worker.job import write_job
 
 from . import figures
 
 VIDEO = figures.ROOT / "research" / "people" / "sample" / "capture.mp4"
-ROWS = ("standard", "draft", "frames-300")
-BEFORE_DRAFT = ("frames", "cameras")
+SHARED = ("frames", "cameras")
 """Stages whose settings a draft shares with the standard quality."""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("work", type=Path)
-    parser.add_argument("--rows", nargs="+", choices=ROWS, default=list(ROWS[:2]))
-    parser.add_argument("--film", type=Path, help="a video of 300 frames or more")
     parser.add_argument("--json", type=Path, required=True)
     options = parser.parse_args()
-    if "frames-300" in options.rows and options.film is None:
-        parser.error("the row frames-300 needs --film")
-    for row in options.rows:
-        costs = measure_row(row, options.work / f"{row}.wildcap", options.film)
-        figures.write_record(
-            options.json,
-            "costs",
-            "python -m research.benchmarks.costs WORK --json OUT.json",
-            {row: {**costs, "together": sum_costs(costs)}},
-            keep=True,
-        )
-    print(table(figures.read_record(options.json.stem, options.json.parent)["figures"]))
+    if options.work.exists():
+        parser.error(f"{options.work} exists: name a new folder.")
+    standard, draft = (options.work / f"{quality}.wildcap" for quality in ("standard", "draft"))
+    rows = {"standard": measure_stages(standard, stages.NAMES, "standard")}
+    shutil.copytree(standard, draft, ignore=shutil.ignore_patterns("maps*", "checkpoints"))
+    rest = tuple(name for name in stages.NAMES if name not in SHARED)
+    rows["draft"] = {**{name: rows["standard"][name] for name in SHARED}, **measure_stages(draft, rest, "draft")}
+    record = {quality: {**costs, "together": sum_costs(costs)} for quality, costs in rows.items()}
+    command = "python -m research.benchmarks.costs WORK --json research/records/costs.json"
+    figures.write_record(options.json, "costs", command, record)
+    print(table(record))
 
 
-def measure_row(row: str, capture: Path, film: Path | None) -> dict[str, dict]:
-    """Measure each stage of a row of ROWS. Raises SystemExit where one fails."""
-    shutil.rmtree(capture, ignore_errors=True)
-    source, options, names = VIDEO, [], stages.NAMES
-    if row == "draft":
-        standard = capture.with_name("standard.wildcap")
-        shutil.copytree(standard, capture, ignore=shutil.ignore_patterns("maps*", "checkpoints"))
-        options, names = ["--quality", "draft"], tuple(name for name in names if name not in BEFORE_DRAFT)
-    elif film is not None and row == "frames-300":
-        source, options = film, ["--set", "frames.max_frames=300"]
+def measure_stages(capture: Path, names: tuple[str, ...], quality: str) -> dict[str, dict]:
+    """Measure these stages in order. Raises SystemExit with the problem of one that fails."""
     costs = {}
-    for stage in names:
-        costs[stage] = measure_stage(capture, stage, source, options)
-        if "problem" in costs[stage]:
-            sys.exit(costs[stage]["problem"])
-        print(f"{row}: {stage}: {cell(costs[stage])}", flush=True)
+    for name in names:
+        costs[name] = measure_stage(capture, name, VIDEO, quality)
+        if "problem" in costs[name]:
+            raise SystemExit(costs[name]["problem"])
+        print(f"{quality}: {name}: {cell(costs[name])}", flush=True)
     return costs
 
 
-def measure_stage(capture: Path, stage: str, source: Path, options: list[str] | None = None) -> dict:
-    """Run one stage, even if it is fresh, and measure its process and those that it starts.
+def measure_stage(
+    capture: Path, stage: str, source: Path, quality: str = "standard", settings: dict | None = None
+) -> dict:
+    """Run one stage in a worker, even if it is fresh, and measure the worker and the processes that it starts.
 
     Returns {"seconds", "processor_s", "peak_mb"}, peak_mb being that of the largest process (Linux, macOS), or
-    {"problem"} with what was printed if the stage failed.
+    {"problem", "remedy"} if the stage failed.
     """
-    words = ["run", str(source), str(capture), "--from", stage, "--until", stage, *(options or ())]
+    face = Capture(capture)
+    face.claim()
+    job = write_job(face, source=source, first=stage, last=stage, settings=settings, quality=quality)
     began = time.monotonic()
-    child = subprocess.Popen(
-        [sys.executable, "-m", "core", *words],
+    worker = subprocess.Popen(
+        [sys.executable, "-m", "core.worker", str(job)],
         cwd=figures.ROOT,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
+        stdin=subprocess.PIPE,  # its end would end the worker
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
         text=True,
     )
-    errors = child.stderr.read()
-    _, status, usage = os.wait4(child.pid, 0)
-    if os.waitstatus_to_exitcode(status) != 0:
-        return {"problem": errors.strip()[-1000:]}
+    last = from_line(worker.stdout.read().splitlines()[-1])
+    _, _, usage = os.wait4(worker.pid, 0)
+    if not isinstance(last, Done):
+        return {"problem": last.problem, "remedy": last.remedy}
     unit = 1 if sys.platform == "darwin" else 1024
     return {
         "seconds": round(time.monotonic() - began, 1),
@@ -104,13 +99,10 @@ def sum_costs(costs: dict[str, dict]) -> dict:
 
 
 def table(rows: dict) -> str:
-    """Markdown: a line for each stage, a column for each row; a stage that a draft shares shows the standard cost."""
-    names = [row for row in ROWS if row in rows]
-    lines = [
-        [stage, *(cell(rows[row].get(stage) or rows["standard"][stage]) for row in names)] for stage in stages.NAMES
-    ]
-    total = ["**together**", *(f"**{rows[row]['together']['minutes']:.1f} min**" for row in names)]
-    return figures.markdown(["stage: seconds, peak memory", *names], [*lines, total])
+    """Lay out the costs as Markdown: a line for each stage, a column for each quality."""
+    lines = [[name, *(cell(costs[name]) for costs in rows.values())] for name in stages.NAMES]
+    total = ["**together**", *(f"**{costs['together']['minutes']:.1f} min**" for costs in rows.values())]
+    return figures.markdown(["stage: seconds, peak memory", *rows], [*lines, total])
 
 
 def cell(cost: dict) -> str:

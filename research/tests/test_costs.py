@@ -7,8 +7,8 @@ from research.benchmarks.costs import VIDEO, measure_stage
 
 
 def test_a_stage_is_measured_with_the_processes_that_it_starts(tmp_path):
-    cost = measure_stage(tmp_path / "a.wildcap", "frames", VIDEO, ["--set", "frames.max_frames=4"])
-    assert 0 < cost["processor_s"] and 50 < cost["peak_mb"] < 4000
+    cost = measure_stage(tmp_path / "a.wildcap", "frames", VIDEO, settings={"frames": {"max_frames": 4}})
+    assert cost["processor_s"] > 1 and cost["peak_mb"] > 200, "the worker's, with its libraries"
     assert Capture(tmp_path / "a.wildcap").frames_json.is_file()
 
 

@@ -2,18 +2,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A short training of the delighting network on subjects with plain skin."""
 
-import json
+from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from core.capture.messages import Problem, Reporter
+from core.capture.messages import Reporter
 from core.geometry.meshes import vertex_normals
 from core.stages.delight.unet import SIDE_PX
 from research.people import olat, sight
 from research.people.identities import subject_mesh
-from research.training import delighter, people
-from research.training.descent import TrainingRun
+from research.training import delighter, people, portraits
+from research.training.descent import Run
+from research.training.networks import train
 
 CONFIG = {
     "model": {"widths": [16, 16, 16, 16], "depths": [1, 1, 1, 1]},
@@ -21,45 +21,29 @@ CONFIG = {
 }
 
 
-def test_a_training_goes_on_from_weights_and_its_card_keeps_people_apart(monkeypatch, tmp_path):
-    def prepare_here(seeds, views, work, *rest):
-        for seed in seeds:
-            if not people.is_prepared(seed, views, work):
-                people._prepare_one((seed, views, work))
-
+def test_a_training_starts_from_weights_and_its_card_says_so(monkeypatch, tmp_path):
     monkeypatch.setitem(delighter.CONFIGS, "cpu", CONFIG)
-    monkeypatch.setattr(delighter, "prepare", prepare_plain_sights)
-    # here and of small maps; that processes of their own prepare people is tested in test_people_portraits.py
-    monkeypatch.setattr(delighter, "prepare_people", prepare_here)
+    monkeypatch.setattr(portraits, "make_sights", make_plain_sights)
     monkeypatch.setattr(people, "TEXELS", 128)
-    out, work = tmp_path / "out.safetensors", tmp_path / "work"
-
-    def train(name, *run, **options):
-        report = Reporter("train", emit=lambda message: None)
-        return delighter.train_delighter("cpu", tmp_path / name, report, TrainingRun(*run, work=work, **options))
-
-    with pytest.raises(Problem, match="no people"):
-        train(out.name, growing=True)
-    first = train(out.name, 0.005)
-    assert first["steps"] > 0 and first["started"] == "random weights" and len(first["people"]) == 1
+    report, work = Reporter("train"), tmp_path / "work"
+    run = Run("cpu", work, tmp_path / "out.safetensors", minutes=0.005)
+    first = train(delighter.TRAINING, run, report)
+    assert first["steps"] > 0 and first["started"] == "random weights" and first["people"] == first["seeds"]
+    assert first["held_out"]["none"] > 0 and first["held_out"]["people_none"] > 0
     (work / "state.pt").unlink()
-    assert train("next.safetensors", 0.005, start=out)["started"] == "the weights before"
-    assert json.loads(out.with_suffix(".json").read_text(encoding="utf-8"))["held_out"]["none"] > 0
-    assert not set(first["seeds"]) & set(first["held_out_seeds"])
+    second = train(delighter.TRAINING, replace(run, out=tmp_path / "next.safetensors", start=run.out), report)
+    assert second["started"] == "the weights before" and second["command"].endswith("--start delighter.safetensors")
 
 
-def prepare_plain_sights(seeds, views, work, *rest):
-    """Sights of subjects with plain skin: what `prepare` makes in seconds, in tenths of one."""
-    for seed in seeds:
-        place = work / f"subject_{seed}"
-        if place.is_dir():
-            continue
-        place.mkdir(parents=True)
-        mesh, rng = subject_mesh(seed), np.random.default_rng(seed)
-        visible = np.ones((len(mesh.vertices), olat.LIGHTS), bool)
-        stage = olat.LightStage(mesh, vertex_normals(mesh).astype(np.float32), visible)
-        np.save(place / "visible.npy", np.packbits(visible, axis=1))
-        plain = np.broadcast_to(np.float32([0, 0, 1]), (64, 64, 3))
-        view = sight.random_camera(sight.landmarks_of(stage), SIDE_PX, rng)
-        diffuse, gloss = np.full((64, 64, 3), 0.3, np.float32), np.full((64, 64), 0.03, np.float32)
-        sight.save(place / "0.npz", sight.trace_sight(stage, view, diffuse, gloss, plain, rng))
+def make_plain_sights(store, seed, **_):
+    """Trace the sights of a subject with plain skin, in tenths of a second."""
+    path = store.path(seed, 0)
+    path.parent.mkdir()
+    mesh, rng = subject_mesh(seed), np.random.default_rng(seed)
+    visible = np.ones((len(mesh.vertices), olat.LIGHTS), bool)
+    stage = olat.LightStage(mesh, vertex_normals(mesh).astype(np.float32), visible)
+    np.save(path.with_name("visible.npy"), np.packbits(visible, axis=1))
+    plain = np.broadcast_to(np.float32([0, 0, 1]), (64, 64, 3))
+    view = sight.random_camera(sight.landmarks_of(stage), SIDE_PX, rng)
+    diffuse, gloss = np.full((64, 64, 3), 0.3, np.float32), np.full((64, 64), 0.03, np.float32)
+    sight.save(path, sight.trace_sight(stage, view, diffuse, gloss, plain, rng))

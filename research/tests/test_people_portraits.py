@@ -17,6 +17,7 @@ from research.people.lifelike import markings, portraits, relightable
 from research.people.lifelike.figure import make_figure
 from research.training import people
 from research.training.portraits import LEAST_WEIGHT, PortraitBatch, repainted
+from research.training.sights import SightStore, Source, stack_examples
 
 QUIET = Reporter("train", emit=lambda message: None)
 BEARDED = 1010
@@ -98,11 +99,11 @@ def test_a_lamp_that_is_blocked_everywhere_lights_nothing(stage):
 
 
 def test_batches_show_each_sight_under_two_lights_and_depend_on_the_seed_alone(tmp_path):
-    people.prepare_people([BEARDED], 1, tmp_path, QUIET, processes=1)
-    drawn = [
-        people.People([BEARDED, BEARDED + 1], 1, tmp_path, None).draw(1, np.random.default_rng(3)) for _ in range(2)
-    ]
-    assert all(np.array_equal(getattr(drawn[0], f.name), getattr(drawn[1], f.name)) for f in fields(drawn[0]))
+    store = SightStore(tmp_path, "person", 1)
+    store.prepare([BEARDED], people.make_sights, QUIET, processes=2)
+    source = Source(store, [BEARDED], people.shoot)
+    drawn = [stack_examples(PortraitBatch, source.draw(1, np.random.default_rng(3))) for _ in range(2)]
+    assert all(map(torch.equal, *drawn))
     batch = drawn[0]
     assert batch.layers.shape[0] == 2 and not np.allclose(batch.shading[0], batch.shading[1], atol=0.1)
     log = batch.layers[:, 3:6].unfold(2, 2, 2).unfold(3, 2, 2).mean((-1, -2))

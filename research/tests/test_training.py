@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the prior is trained on, and that a training knows what it may learn from and goes on where it stopped."""
+"""Training data of the prior, its training, and the command line of all trainings."""
 
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -14,10 +15,13 @@ from core.face import template
 from core.imaging import images
 from core.solver.prior.prior import build_network
 from core.stages.solve.prior_files import load
+from research.benchmarks.head.parts import LIKENESSES
 from research.people import pigment
+from research.people.identities import reserved_seeds
 from research.training import __main__ as trainings
-from research.training import prior, skins
-from research.training.descent import TrainingRun
+from research.training import glasses, prior, seeds, skins
+from research.training.descent import Run
+from research.training.networks import train
 from research.training.patches import Windows, mean_map, spread_about
 
 QUIET = Reporter("train", emit=lambda message: None)
@@ -45,7 +49,7 @@ def cache(tmp_path_factory):
     """A training's cache with three subjects in it."""
     folder = tmp_path_factory.mktemp("cache")
     for seed in (1000, 1001, 9000):
-        skins._store(folder / f"skin_{seed}_{skins.SIZE}.npy", fake_skin(seed))
+        skins.store_maps(folder / f"skin_{seed}_{skins.SIZE}.npy", fake_skin(seed))
     return folder
 
 
@@ -81,7 +85,7 @@ def test_baked_shading_is_divided_out(seen):
     sky[[0, 1, 2, 3]] = 3.0, -0.6, 1.4, 0.8  # from above and from one side
     shading = np.maximum(np.tensordot(sky, skins._sky_basis(), 1), 0.01)
     lit = np.clip(0.25 * face * cv2.resize(shading / shading.mean(), (512, 512)), 0, 1).transpose(1, 2, 0)
-    where = (skins._bare(512) > 0.9) & (template.mask("lips", 512) < 0.1)
+    where = (skins.bare_face(512) > 0.9) & (template.mask("lips", 512) < 0.1)
     relative = [
         np.log(image.mean(-1) / face.mean(0))[where] for image in (lit, skins.unshaded(lit.astype(np.float32), mean))
     ]
@@ -144,39 +148,36 @@ def test_carried_skins_teach_only_the_diffuse_they_know(carried, cache, seen):
     torch.nn.init.normal_(network.proj_out.weight, std=0.05)
     other = torch.where(batch.known > 0, batch.clean, torch.rand_like(batch.clean))
     losses = [
-        prior._loss(network, statistics, b, np.random.default_rng(0), "cpu")
-        for b in (batch, type(batch)(other, *list(vars(batch).values())[1:]))
+        prior.loss(network, statistics, each, np.random.default_rng(0)) for each in (batch, batch._replace(clean=other))
     ]
-    assert torch.equal(*losses) and torch.isfinite(losses[0]).all()  # what is not known has no say
+    assert torch.equal(*losses) and torch.isfinite(losses[0]).all()  # the unknown has no influence
 
 
-def test_a_training_goes_on_where_it_stopped(carried, cache, tmp_path, monkeypatch):
-    tiny = prior.CONFIGS["cpu"] | {
-        "model": prior.CONFIGS["cpu"]["model"] | {"channels": [8, 8, 8], "depths": [1, 1, 1]}
+def test_a_prior_learns_from_carried_skins_but_the_held_out_ones(carried, cache, tmp_path, monkeypatch):
+    tiny = {
+        "model": prior.CONFIGS["cpu"]["model"] | {"channels": [8, 8, 8], "depths": [1, 1, 1]},
+        "training": prior.CONFIGS["cpu"]["training"] | {"batch": 4, "patch": 32, "skins": 2, "held_out": 1},
     }
-    tiny["training"] = tiny["training"] | {"batch": 4, "patch": 32, "skins": 2, "held_out": 1}
-    monkeypatch.setitem(prior.CONFIGS, "cpu", tiny)
-    out = tmp_path / "prior.safetensors"
+    monkeypatch.setitem(prior.CONFIGS, "cpu", prior.CONFIGS["cpu"] | tiny)
+    run = Run("cpu", cache, tmp_path / "prior.safetensors", minutes=0.01, skins=carried, held_out=["b"])
     with pytest.raises(Problem, match="no skin named z"):
-        prior.train_prior("cpu", out, QUIET, TrainingRun(0.01, cache), carried, ["z"])
-    first = prior.train_prior("cpu", out, QUIET, TrainingRun(0.01, cache), carried, ["b"])
-    second = prior.train_prior("cpu", out, QUIET, TrainingRun(0.02, cache), carried, ["b"])
-    assert 0 < first["steps"] < second["steps"]
-    assert second["skins"] == ["a"] and second["held_out_skins"] == ["b"] and second["notices"] == ["Theirs."]
-    assert set(second["held_out"]["loss"]) == {"synthetic", "carried"}
-    assert not set(second["seeds"]) & set(second["held_out_seeds"])
-    conditioned = load(out).of_tone(torch.tensor([0.4, 0.3, 0.2]))
-    assert (
-        conditioned(torch.zeros(1, 7, 32, 32), 1.0, torch.zeros(1, 2, 32, 32) + torch.linspace(0, 0.1, 32))
-        .isfinite()
-        .all()
-    )
-    with pytest.raises(Problem, match="other data"):
-        prior.train_prior("cpu", out, QUIET, TrainingRun(0.03, cache))
+        train(prior.TRAINING, replace(run, held_out=["z"]), QUIET)
+    card = train(prior.TRAINING, run, QUIET)
+    assert card["skins"] == ["a"] and card["held_out_skins"] == ["b"] and card["notices"] == ["Theirs."]
+    assert set(card["held_out"]["loss"]) == {"synthetic", "carried"}
+    conditioned = load(run.out).of_tone(torch.tensor([0.4, 0.3, 0.2]))
+    coordinates = torch.zeros(1, 2, 32, 32) + torch.linspace(0, 0.1, 32)
+    assert conditioned(torch.zeros(1, 7, 32, 32), 1.0, coordinates).isfinite().all()
 
 
-@pytest.mark.parametrize("words, said", [([], "is missing"), (["patience"], "Unknown training: 'patience'")])
-def test_a_training_that_there_is_not_is_told_which_there_are(capsys, words, said):
-    assert trainings.main(words) == 2
-    told = capsys.readouterr().err
-    assert said in told and "prior" in told and "descent" not in told
+@pytest.mark.parametrize("first", [seeds.FIRST_SEED, glasses.FIRST_SEED])
+def test_nobody_who_is_measured_is_learnt_from(first):
+    learnt, held_out = (set(each) for each in (seeds.training_seeds(800, first), seeds.held_out_seeds(6)))
+    assert len(learnt) == 800 and not learnt & held_out and not (learnt | held_out) & reserved_seeds()
+    assert {person.seed for person in LIKENESSES} <= reserved_seeds()
+
+
+@pytest.mark.parametrize("name", trainings.NETWORKS)
+def test_there_is_nothing_to_export_before_a_training(name, tmp_path, capsys):
+    assert trainings.main([name, "--export", "--work", str(tmp_path)]) == 2
+    assert "no training" in capsys.readouterr().err

@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The upscaler's training: it goes on where it stopped, and what it learns from is degraded and turned as it says."""
+"""Training of the upscaler: its data are degraded and turned as they should be."""
 
 import numpy as np
 import pytest
 
-from core.capture.messages import Problem, Reporter
+from core.capture.messages import Reporter
 from core.imaging import images
-from core.solver.upsampling import network
 from core.stages.upscale.enlarge import load_network
 from research.training import fine_windows, upscaler
-from research.training.descent import TrainingRun
+from research.training.descent import Run
+from research.training.networks import train
 
 
 @pytest.fixture(scope="module")
@@ -26,32 +26,16 @@ def windows(tmp_path_factory):
     return work
 
 
-def test_a_training_goes_on_where_it_stopped(windows, tmp_path, monkeypatch):
-    tiny = {
-        "model": {"groups": 1, "blocks": 2, "width": 16},
-        "training": {
-            "patch": 8,
-            "batch": 4,
-            "rate": 5e-3,
-            "minutes": 1,
-            "skins": 2,
-            "views": 1,
-            "held_out": 1,
-            "seed": 0,
-            "workers": 0,
-        },
-    }
-    monkeypatch.setitem(upscaler.CONFIGS, "cpu", tiny)
-    out = tmp_path / "upscaler.safetensors"
-    first = upscaler.train_upscaler("cpu", out, Reporter("train"), TrainingRun(0.01, windows))
-    second = upscaler.train_upscaler("cpu", out, Reporter("train"), TrainingRun(0.02, windows))
-    assert second["steps"] > first["steps"] > 0 and second["parameters"] == sum(
-        p.numel() for p in network.Rcan(**tiny["model"]).parameters()
+def test_a_trained_upscaler_has_the_blocks_that_are_kept(windows, tmp_path, monkeypatch):
+    options = upscaler.CONFIGS["cpu"]["training"] | {"patch": 8, "batch": 4, "skins": 2, "views": 1, "held_out": 1}
+    monkeypatch.setitem(
+        upscaler.CONFIGS, "cpu", {"model": {"groups": 1, "blocks": 4, "width": 16}, "training": options}
     )
-    assert load_network(out).tail.weight.abs().max() > 0 and out.with_suffix(".json").is_file()
-    monkeypatch.setitem(upscaler.CONFIGS, "gpu", tiny)
-    with pytest.raises(Problem, match="other data or of another configuration"):
-        upscaler.train_upscaler("gpu", out, Reporter("train"), TrainingRun(work=windows))
+    run = Run("cpu", windows, tmp_path / "upscaler.safetensors", minutes=0.01)
+    card = train(upscaler.TRAINING, run, Reporter("train"))
+    trained = load_network(run.out)
+    assert card["model"]["blocks"] == upscaler.KEPT and card["steps"] > 0
+    assert card["parameters"] == sum(each.numel() for each in trained.parameters())
 
 
 def test_degrading_keeps_the_mean_and_halves_a_relief_as_asked():

@@ -1,18 +1,16 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the upscaler learns from: windows of synthetic skins painted at 4096, and what a solver's 1024 map of the same
-place would be.
+"""Training data of the upscaler: windows of synthetic skins at 4096, and a solver's 1024 map of the same place.
 
 Only the windows are painted, never a whole 4096 map: a skin is a function of points on the head.
 """
 
 from __future__ import annotations
 
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from multiprocessing import get_context
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -27,6 +25,7 @@ from core.imaging import images
 from ..people.canvas import canvas, make_window_canvas
 from ..people.parameters import adorned, sample_parameters
 from ..people.skin import GROUND, paint_skin
+from .sights import run_jobs, stack_examples
 
 SIZE = 4096
 SIDE, MARGIN = 1024, 96
@@ -35,11 +34,20 @@ over any distance, are left out."""
 FACTOR, CHANNELS = 4, 7
 
 
+class WindowBatch(NamedTuple):
+    """small [N, 7, P, P] and large [N, 7, 4 P, 4 P], float32 in the network's channels."""
+
+    small: torch.Tensor
+    large: torch.Tensor
+
+
 @dataclass(frozen=True)
 class Degradation:
-    """What the solver's maps lack beside size: sigma of a blur in texels of the small map, of the diffuse and of the
-    other channels; deviation of the noise (sRGB of the diffuse; the others take twice as much); the share of their fine
-    relief that normals keep."""
+    """Losses of the solver's maps beside size.
+
+    blur, other_blur: sigma in texels of the small map, of the diffuse and of the other channels; noise: deviation (sRGB
+    of the diffuse; the others take twice as much); relief: the share of their fine relief that normals keep.
+    """
 
     blur: float
     other_blur: float
@@ -47,37 +55,22 @@ class Degradation:
     relief: float
 
 
-def prepare(seeds: list[int], views: int, work: Path, report: Reporter, workers: int) -> None:
-    """Paints windows of skins, those that are missing (some seconds each).
-
-    Parameters
-    ----------
-    seeds : the subjects
-    views : windows of each
-    work : folder in which they are kept
-    report : hears of progress
-    workers : processes
-    """
-    wanted = [(seed, i) for seed in seeds for i in range(views) if not _path(work, seed, i).is_file()]
-    if not wanted:
-        return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        for done, _ in enumerate(pool.map(partial(_paint, Path(work)), wanted)):
-            report.progress(done + 1, len(wanted), f"window {done + 1} of {len(wanted)}")
+def prepare(seeds: list[int], views: int, work: Path, report: Reporter, processes: int) -> None:
+    """Paint the missing ones of `views` windows of each skin (some seconds each)."""
+    missing = [(seed, i) for seed in seeds for i in range(views) if not _path(work, seed, i).is_file()]
+    run_jobs(partial(_paint, work), missing, "window", report, processes)
 
 
 class FineWindows:
-    """Draws pairs (small, large) from prepared windows: float32 [N, 7, P, P] and [N, 7, 4P, 4P] in the network's
-    channels."""
+    """Draws batches from prepared windows."""
 
     def __init__(self, seeds: list[int], views: int, work: Path):
         self.paths = [_path(work, seed, i) for seed in seeds for i in range(views)]
 
-    def draw(self, count: int, patch: int, rng: np.random.Generator) -> tuple[torch.Tensor, torch.Tensor]:
-        pairs = [self._one(patch, rng) for _ in range(count)]
-        return torch.stack([small for small, _ in pairs]), torch.stack([large for _, large in pairs])
+    def draw(self, count: int, patch: int, rng: np.random.Generator) -> WindowBatch:
+        return stack_examples(WindowBatch, [self._one(patch, rng) for _ in range(count)])
 
-    def _one(self, patch: int, rng: np.random.Generator) -> tuple[torch.Tensor, torch.Tensor]:
+    def _one(self, patch: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         window = np.load(self.paths[rng.integers(len(self.paths))], mmap_mode="r")
         around = patch + 8  # room for the blur
         row, column = FACTOR * rng.integers(0, window.shape[1] // FACTOR - around + 1, 2)
@@ -85,16 +78,12 @@ class FineWindows:
         large = _turned(large, rng)
         small = degraded(large, random_degradation(rng), rng)
         edge = 4
-        return (
-            torch.from_numpy(np.ascontiguousarray(small[:, edge:-edge, edge:-edge])),
-            torch.from_numpy(
-                np.ascontiguousarray(large[:, FACTOR * edge : -FACTOR * edge, FACTOR * edge : -FACTOR * edge])
-            ),
-        )
+        inner = slice(FACTOR * edge, -FACTOR * edge)
+        return small[:, edge:-edge, edge:-edge], large[:, inner, inner]
 
 
 def random_degradation(rng: np.random.Generator) -> Degradation:
-    """From a plain reduction to the soft, faintly noisy maps that sampling a prior gives."""
+    """Draw from a plain reduction to the soft, faintly noisy maps that sampling a prior gives."""
     blur = rng.uniform(0.0, 0.8) if rng.random() < 0.7 else 0.0
     return Degradation(
         blur,
@@ -105,8 +94,10 @@ def random_degradation(rng: np.random.Generator) -> Degradation:
 
 
 def degraded(large: np.ndarray, degradation: Degradation, rng: np.random.Generator) -> np.ndarray:
-    """The small map [7, H, W] (network channels) of a large one [7, 4H, 4W]: the albedo is averaged in linear light,
-    normals are of length one again."""
+    """Reduce a large map [7, 4 H, 4 W] (network channels) to a small one [7, H, W].
+
+    The albedo is averaged in linear light, normals are of length one again.
+    """
     height, width = large.shape[1] // FACTOR, large.shape[2] // FACTOR
     linear = np.concatenate([images.srgb_to_linear(large[:3]), large[3:]])
     small = linear.reshape(CHANNELS, height, FACTOR, width, FACTOR).mean((2, 4))
@@ -124,7 +115,7 @@ def degraded(large: np.ndarray, degradation: Degradation, rng: np.random.Generat
 
 
 def _turned(maps: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Mirrored and transposed at random; the normals turn along."""
+    """Mirror and transpose maps at random; the normals turn along."""
     maps = maps.copy()
     if rng.random() < 0.5:
         maps = maps[:, :, ::-1]
@@ -139,11 +130,11 @@ def _turned(maps: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def _path(work: Path, seed: int, index: int) -> Path:
-    return Path(work) / f"window_{seed}_{index}.npy"
+    return work / f"window_{seed}_{index}.npy"
 
 
 def _paint(work: Path, window: tuple[int, int]) -> None:
-    """One window as float16 [7, S, S]: three of four lie on the face, the others anywhere on the head."""
+    """Paint one window, float16 [7, S, S]: three of four lie on the face, the others anywhere on the head."""
     seed, index = window
     rng = np.random.default_rng([seed, 40, index])
     where = _face() if index % 4 != 3 else _head()
@@ -152,11 +143,9 @@ def _paint(work: Path, window: tuple[int, int]) -> None:
     parameters = replace(adorned(sample_parameters(seed), seed), scars=0.0)
     skin = paint_skin(parameters, make_window_canvas(SIZE, row, column, SIDE), canvas(GROUND))
     inner = slice(MARGIN, SIDE - MARGIN)
-    maps = np.concatenate([images.linear_to_srgb(skin.diffuse), skin.normal, skin.specular[..., None]], -1)[
-        inner, inner
-    ]
-    with replacing(_path(work, seed, index)) as temporary, open(temporary, "wb") as file:
-        np.save(file, maps.transpose(2, 0, 1).astype(np.float16))
+    maps = np.concatenate([images.linear_to_srgb(skin.diffuse), skin.normal, skin.specular[..., None]], -1)
+    with replacing(_path(work, seed, index)) as temporary:
+        np.save(temporary, maps[inner, inner].transpose(2, 0, 1).astype(np.float16))
 
 
 @cache

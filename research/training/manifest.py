@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m research.training.manifest: writes core/capture/shipped.json after a network or an asset was made again
-(core/capture/shipped_files.py reads it)."""
+"""Write core/capture/shipped.json, after a network or an asset was made: `python -m research.training.manifest`."""
 
 from __future__ import annotations
 
@@ -13,7 +12,7 @@ FOLDERS = ("assets", "weights")
 
 
 def make_manifest() -> dict[str, dict[str, str]]:
-    """What the manifest says of the files as they are now."""
+    """Return the manifest of the files as they are now."""
     files = (
         path
         for folder in FOLDERS

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random windows of the skins at three scales, mirrored and moved in tone, and the statistics that the prior's network
-is built around."""
+"""Random windows of the skins at three scales, and the statistics that the prior's network is built around."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -14,7 +14,7 @@ from core.face import template
 from core.solver.prior.prior import make_coordinates, mean_at
 
 from ..people import pigment
-from .skins import SCALES, SIZE, Skins, shrink
+from .skins import SCALES, SIZE, Skins, facial_skin, shrink
 
 LN_MELANIN = np.log(0.008), np.log(0.45)
 """Range of the melanin fraction that a skin's tone is moved to: very light to very dark."""
@@ -23,10 +23,8 @@ REACH, DARK_REACH = 1.2, 0.4
 well."""
 
 
-@dataclass(frozen=True)
-class PatchBatch:
-    """clean [N, 7, P, P], known [N, 7, P, P]: 1 where `clean` is true; coords [N, 2, P, P], tone [N, 3], scale [N];
-    float32."""
+class PatchBatch(NamedTuple):
+    """Windows: clean [N, 7, P, P]; known, 1 where `clean` is true; coords [N, 2, P, P]; tone [N, 3]; scale [N]."""
 
     clean: torch.Tensor
     known: torch.Tensor
@@ -44,25 +42,16 @@ class Windows:
         share = np.where(whole, (1 - real) / max(whole.sum(), 1), real / max((~whole).sum(), 1))
         self.chance = share / share.sum()
         self.face = np.argwhere(template.mask("face", SIZE) > 0.5)
-        bare = (
-            template.mask("skin", SIZE // SCALES[-1])
-            * template.mask("face", SIZE // SCALES[-1])
-            * (1 - template.mask("eyes", SIZE // SCALES[-1]))
-        )
+        bare = facial_skin(SIZE // SCALES[-1])
         some = np.flatnonzero(bare > 0.9)[::29]  # enough texels of facial skin for its mean
         self.sparse = [
             m[:, some // bare.shape[1], some % bare.shape[1]].float().numpy()[:, None] for m in skins.maps[SCALES[-1]]
         ]
 
     def draw(self, count: int, patch: int, rng: np.random.Generator, augment: bool = True) -> PatchBatch:
-        """Random windows: a third of each scale, three quarters of them on the face.
+        """Draw windows of side `patch` in texels of their own scale; with `augment`, mirrored and moved in tone.
 
-        Parameters
-        ----------
-        count : N
-        patch : side P in texels of a window's own scale
-        rng : of all of it
-        augment : whether they are mirrored and re-toned
+        A third is of each scale, three quarters are on the face.
         """
         drawn = [self._one(patch, rng, augment) for _ in range(count)]
         return PatchBatch(*(torch.stack(parts) for parts in zip(*drawn, strict=True)))
@@ -92,8 +81,10 @@ class Windows:
         return clean, known, coords, tone, torch.tensor(scale)
 
     def _toned(self, maps: np.ndarray, index: int, rng: np.random.Generator) -> tuple[torch.Tensor, torch.Tensor]:
-        """A window [9, P, P] of skin `index` with more or less melanin and blood, and its tone, which is never known
-        exactly."""
+        """Give a window [9, P, P] of skin `index` other melanin and blood.
+
+        Returns it with its tone, which is never known exactly.
+        """
         sparse = self.sparse[index]
         own = float(np.median(sparse[7]))
         lightest = -DARK_REACH if own > np.log(0.3) else -REACH
@@ -111,22 +102,23 @@ class Windows:
 
 
 def _change(melanin: np.ndarray, blood: np.ndarray, more_melanin: float, more_blood: float) -> np.ndarray:
-    """What happens to an albedo of these pigments (logarithms [H, W]) when each changes by a factor: [3, H, W]."""
+    """Return the factor [3, H, W] of an albedo whose pigments, logarithms [H, W], change."""
     before = pigment.reflectance(np.exp(melanin), np.exp(blood))
     after = pigment.reflectance(np.exp(melanin + more_melanin), np.exp(blood + more_blood))
     return np.moveaxis(after / before, -1, 0)
 
 
 def mean_map(skins: Skins, size: int = 256) -> torch.Tensor:
-    """The mean face [7, size, size], symmetric: geometric mean of albedo over tone, mean normal (of length one), mean 2
-    * specular - 1. Each skin counts where it is known, which the whole ones are everywhere."""
-    factor = SIZE // SCALES[1] // size
+    """Return the mean face [7, size, size], symmetric: each skin counts where it is known.
+
+    Geometric mean of albedo over tone, mean normal (of length one), mean 2 * specular - 1.
+    """
     total, weight = torch.zeros(7, size, size), torch.zeros(7, size, size)
-    for maps, area, tone in zip(skins.maps[SCALES[1]], skins.known[SCALES[1]], skins.tones, strict=True):
-        small = torch.from_numpy(shrink(maps.numpy(), factor))[:7].float()
+    for small, area, tone in _shrunk(skins, size):
         small[:3] = ((small[:3] + 1) / 2).clamp_min(1e-3).log() - tone.log()[:, None, None]
         known = torch.ones(7, size, size)
         if area is not None:
+            factor = len(area) // size
             known[:3], known[3:] = area[::factor, ::factor].float(), 0
         total, weight = total + known * small, weight + known
     mean = total / weight.clamp_min(1e-6)
@@ -137,20 +129,24 @@ def mean_map(skins: Skins, size: int = 256) -> torch.Tensor:
 
 
 def reference_skins(skins: Skins, count: int = 16, size: int = 128) -> torch.Tensor:
-    """The first `count` whole skins in the mean face's form [count, 7, size, size]: albedo over tone, normal, 2 *
-    specular - 1."""
-    factor, references = SIZE // SCALES[1] // size, []
-    for maps, area, tone in zip(skins.maps[SCALES[1]], skins.known[SCALES[1]], skins.tones, strict=True):
+    """Return the first `count` whole skins [count, 7, size, size]: albedo over tone, normal, 2 * specular - 1."""
+    references = []
+    for small, area, tone in _shrunk(skins, size):
         if area is None and len(references) < count:
-            small = torch.from_numpy(shrink(maps.numpy(), factor))[:7].float()
             small[:3] = (small[:3] + 1) / 2 / tone[:, None, None]
             small[3:6] /= small[3:6].norm(dim=0).clamp_min(1e-6)
             references.append(small)
     return torch.stack(references)
 
 
+def _shrunk(skins: Skins, size: int) -> Iterator[tuple[torch.Tensor, torch.Tensor | None, torch.Tensor]]:
+    """Yield each skin's map [7, size, size], where it is known, and its tone."""
+    for maps, area, tone in zip(skins.maps[SCALES[1]], skins.known[SCALES[1]], skins.tones, strict=True):
+        yield torch.from_numpy(shrink(maps.numpy(), maps.shape[-1] // size))[:7].float(), area, tone
+
+
 def spread_about(windows: Windows, mean: torch.Tensor, patch: int) -> torch.Tensor:
-    """Deviation [7] of random windows from the mean face of their tone; of the albedo in units of the tone."""
+    """Return the deviation [7] of random windows from the mean face of their tone, of the albedo in units of it."""
     batch = windows.draw(256, patch, np.random.default_rng(3))
     difference = batch.clean - mean_at(mean, batch.coords, batch.tone)
     difference[:, :3] /= batch.tone[:, :, None, None]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which synthetic subjects are learnt from, which a training watches itself on, and what lights them, by name."""
+"""Names of the synthetic subjects to learn from, of the held-out ones, and of what lights them."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ HELD_OUT_SEED = 9000
 
 
 def training_seeds(count: int, first: int = FIRST_SEED) -> list[int]:
-    """Seeds of so many subjects to learn from."""
+    """Return the seeds of `count` subjects to learn from."""
     return [seed for seed in range(first, first + 2 * count) if seed not in reserved_seeds()][:count]
 
 
 def held_out_seeds(count: int) -> list[int]:
-    """Seeds of so many subjects that are kept from training."""
+    """Return the seeds of `count` subjects that are kept from training."""
     return list(range(HELD_OUT_SEED, HELD_OUT_SEED + count))
 
 
 def named_subjects(count: int, held_out: int) -> dict:
-    """Who is learnt from and who is kept from it, of synthetic subjects alone, as a training's state has it."""
+    """Return the data entry of a training's state, of synthetic subjects alone."""
     return {
         "seeds": training_seeds(count),
         "held_out_seeds": held_out_seeds(held_out),
@@ -37,9 +37,6 @@ def named_subjects(count: int, held_out: int) -> dict:
 
 
 def panorama_names(folder: Path | None) -> list[str]:
-    """The panoramas of a folder, none without one."""
-    return (
-        sorted(path.name for path in Path(folder).iterdir() if path.suffix.lower() in (".hdr", ".exr"))
-        if folder
-        else []
-    )
+    """Return the panoramas' names, none without a folder."""
+    paths = Path(folder).iterdir() if folder else ()
+    return sorted(path.name for path in paths if path.suffix.lower() in (".hdr", ".exr"))

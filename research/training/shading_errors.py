@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the training of the delighter holds a log-shading to: errors [N, 3, S, S] in natural log units, weights [N, 1,
-S, S]."""
+"""Terms of the delighter's loss: errors [N, 3, S, S] of log-shadings, natural log, weights [N, 1, S, S]."""
 
 from __future__ import annotations
 
@@ -9,19 +8,18 @@ import torch
 
 
 def split_tone(error: torch.Tensor, weight: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """An error's mean over each map [N, 3, 1, 1], which is that of the exposure and of the skin's tone, and the
-    rest."""
+    """Split an error into its mean over each map [N, 3, 1, 1] (exposure and skin tone) and the rest."""
     tone = (error * weight).sum((2, 3), keepdim=True) / weight.sum((2, 3), keepdim=True).clamp_min(1)
     return tone, error - tone
 
 
 def mean_size(error: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
-    """The mean absolute error, a scalar."""
+    """Return the mean absolute error, a scalar."""
     return (error.abs() * weight).sum() / weight.sum().clamp_min(1) / error.shape[1]
 
 
 def slope_error(error: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
-    """How much the error changes over 1, 2 and 4 pixels: what is left of an edge, and outlines."""
+    """Return how much the error changes over 1, 2 and 4 pixels: remains of edges, and outlines."""
     total, slopes = weight.sum().clamp_min(1), 0.0
     for step in (1, 2, 4):
         for axis in (2, 3):
@@ -33,13 +31,13 @@ def slope_error(error: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
 
 
 def disagreement(error: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
-    """Of maps 2 k and 2 k + 1, which show one albedo under two lights, how far their albedos differ."""
+    """Return how far the albedos of maps 2 k and 2 k + 1 differ, which show one albedo under two lights."""
     both = weight[0::2] * weight[1::2]
     return mean_size(error[0::2] - error[1::2], both)
 
 
 def mean_deviation(error: torch.Tensor, weight: torch.Tensor) -> float:
-    """Mean over the maps of the mean absolute error about each map's own mean, over all channels."""
+    """Return the mean over the maps of the mean absolute error about each map's own mean, over all channels."""
     _, error = split_tone(error, weight)
     total = weight.sum((2, 3), keepdim=True).clamp_min(1)
     return ((error.abs() * weight).sum((2, 3), keepdim=True) / total).mean().item()

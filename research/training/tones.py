@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fit what the skin tone's estimate knows: the tones of measured people, and what phones make of simulated ones.
+"""Fit the models of the skin tone's estimate: the tones of measured people, and how phones show simulated ones.
 
     python -m research.training tones SPECTRA [--subjects 160] [--out FILE]
 
@@ -11,7 +11,6 @@ kept. Subjects are those of seeds from 1000 up; held-out ones begin at 9000.
 
 from __future__ import annotations
 
-import argparse
 import csv
 import gzip
 from collections import defaultdict
@@ -23,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from core.capture.files import write_json
-from core.capture.messages import Problem, Reporter
+from core.capture.messages import Problem
 from core.face import template
 from core.geometry import meshes, raster
 from core.light.spherical_harmonics import LAMBERT, per_function, sh_basis
@@ -34,7 +33,9 @@ from ..people import light, pigment
 from ..people.exposure import phone_exposure
 from ..people.parameters import sample_parameters
 from ..people.skin import make_skin
+from .networks import make_parser
 from .seeds import FIRST_SEED, HELD_OUT_SEED
+from .skins import facial_skin
 
 SIZE = 32  # texels along a side: the skin's mean needs no detail
 PHONES = 2  # pictures of each subject in each light, each by another phone before other surroundings
@@ -54,11 +55,13 @@ DEGREES = range(1, 5)  # of the polynomials of skin's colour by L*, of which the
 
 @dataclass(frozen=True)
 class LitSkin:
-    """The subject of a seed under a light. colours [N, 3]: skin on a camera whose 1 is white in unit light, its sheen
-    included; normals [N, 3] and weight [N] as `look` takes them; tone [3]: the true mean albedo of the facial skin;
-    light [3]: of a white surface, the mean over the face; card [3]: of a white surface held before the face."""
+    """A subject under a light.
 
-    seed: int
+    colours [N, 3]: skin on a camera whose 1 is white in unit light, its sheen included; normals [N, 3] and weight [N]
+    as `look` takes them; tone [3]: the true mean albedo of the facial skin; light [3]: of a white surface, the mean
+    over the face; card [3]: of a white surface held before the face.
+    """
+
     colours: np.ndarray
     normals: np.ndarray
     weight: np.ndarray
@@ -67,8 +70,8 @@ class LitSkin:
     card: np.ndarray
 
 
-def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m research.training tones", description=__doc__.splitlines()[0])
+def main(arguments: list[str]) -> None:
+    parser = make_parser("tones", __doc__)
     parser.add_argument("spectra", metavar="SPECTRA", type=Path, help="the archive's table, issa.csv.gz")
     parser.add_argument("--subjects", type=int, default=160)
     parser.add_argument("--out", type=Path, default=MODEL_FILE)
@@ -78,38 +81,23 @@ def main(arguments: list[str] | None = None) -> int:
             f"{options.subjects} subjects are too few or too many.", f"Take 50 to {HELD_OUT_SEED - FIRST_SEED}."
         )
     people = fit_people(*read_people(options.spectra))
-    report = Reporter("tones", print)
-    scenes = []
-    for seed in range(FIRST_SEED, FIRST_SEED + options.subjects):
-        report.progress(seed - FIRST_SEED, options.subjects, f"subject {seed}")
-        scenes += scenes_of(seed)
-    write_json(
-        options.out,
-        {
-            **people,
-            **fit_camera(scenes),
-            "licence": "GPL-3.0-or-later",
-            "command": f"python -m research.training tones SPECTRA --subjects {options.subjects}",
-            "data": "People: figures fitted to the International Skin Spectra Archive (Lu et al., Scientific Data "
-            "2025), the mean of each person's facial sites less "
-            f"{100 * SURFACE_REFLECTANCE:.1f} % of surface reflection, origins weighed alike. Camera: "
-            f"simulated skins and lights of research/people, seeds {FIRST_SEED} to "
-            f"{FIRST_SEED + options.subjects - 1}",
-        },
-    )
-    return 0
+    last = FIRST_SEED + options.subjects - 1
+    content = {
+        **people,
+        **fit_camera([scene for seed in range(FIRST_SEED, last + 1) for scene in scenes_of(seed)]),
+        "licence": "GPL-3.0-or-later",
+        "command": f"python -m research.training tones SPECTRA --subjects {options.subjects}",
+        "data": "People: figures fitted to the International Skin Spectra Archive (Lu et al., Scientific Data 2025), "
+        f"the mean of each person's facial sites less {100 * SURFACE_REFLECTANCE:.1f} % of surface reflection, origins "
+        f"weighed alike. Camera: simulated skins and lights of research/people, seeds {FIRST_SEED} to {last}",
+    }
+    write_json(options.out, content)
 
 
 def read_people(spectra: Path) -> tuple[np.ndarray, np.ndarray]:
-    """The diffuse albedo of measured faces.
+    """Read the diffuse albedo of measured faces from the archive's table, whose XYZ are under D65, in percent.
 
-    Parameters
-    ----------
-    spectra : the archive's table; its X, Y and Z are under D65, in percent
-
-    Returns
-    -------
-    Linear sRGB [N, 3], the mean of each person's facial sites, and the person's origin [N].
+    Returns linear sRGB [N, 3], the mean of each person's facial sites, and the person's origin [N].
     """
     sites = defaultdict(lambda: defaultdict(list))
     with gzip.open(spectra, "rt", encoding="utf-8", newline="") as file:
@@ -124,11 +112,11 @@ def read_people(spectra: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fit_people(linear: np.ndarray, origin: np.ndarray) -> dict:
-    """The population's figures from tones [N, 3] and origins [N], the origins weighed alike.
+    """Fit the population's figures to tones [N, 3] and origins [N], the origins weighed alike.
 
     lightness [K]; share [K] of people; ratios [K, 2]: mean ln R/G and ln B/G at that L*; ratio_covariance [2, 2] about
     them; colour_sigma_l: how far L* is off that the colour alone tells of people of another origin, root mean square
-    over origins: what frames leave open even where the light's colour is known.
+    over origins: what frames leave open even if the light's colour is known.
     """
     weight = np.array([1 / (origin == name).sum() for name in origin])
     weight /= weight.sum()
@@ -151,7 +139,7 @@ def fit_people(linear: np.ndarray, origin: np.ndarray) -> dict:
 def _left_out_error(
     inputs: np.ndarray, outputs: np.ndarray, weight: np.ndarray, origin: np.ndarray, degree: int
 ) -> float:
-    """Mean squared error of outputs [N, O], each origin's by a fit to the others, the mean over origins."""
+    """Return the mean squared error of outputs [N, O], each origin's by a fit to the others, the mean over origins."""
     errors = []
     for name in np.unique(origin):
         out = origin == name
@@ -163,7 +151,7 @@ def _left_out_error(
 def _fit_polynomial(
     inputs: np.ndarray, outputs: np.ndarray, weight: np.ndarray, degree: int
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """The polynomial [N, I] -> [N, O] of least weighted squares, without products of two inputs."""
+    """Fit the polynomial [N, I] -> [N, O] of least weighted squares, without products of two inputs."""
     centre, spread = inputs.mean(0), inputs.std(0)
 
     def powers(values: np.ndarray) -> np.ndarray:
@@ -176,10 +164,9 @@ def _fit_polynomial(
 
 
 def scenes_of(seed: int) -> list[LitSkin]:
-    """A random subject under a few random lights, in what light reaches its head past itself, with the sheen that is on
-    all skin."""
+    """Put a random subject under a few random lights, with the head's own shadows and the sheen of all skin."""
     skin_map = make_skin(sample_parameters(seed), SIZE).diffuse
-    facial = template.mask("skin", SIZE) * template.mask("face", SIZE) * (1 - template.mask("eyes", SIZE))
+    facial = facial_skin(SIZE)
     tone = np.average(skin_map.reshape(-1, 3), axis=0, weights=facial.ravel())
     where, points, normals, ambient, caster = _head()
     weight = weigh_skin(SIZE, np.zeros((SIZE, SIZE), np.float32))[where]
@@ -201,16 +188,17 @@ def scenes_of(seed: int) -> list[LitSkin]:
         turned /= np.linalg.norm(turned)
         card = np.maximum((sh_basis(turned) * per_function(LAMBERT)) @ sky, 0.005) + max(turned @ sun, 0) * colour
         used = (weight > 0.05) & ~shadowed
-        skins.append(
-            LitSkin(seed, (skin_map[where] * shading + sheen)[used], normals[used], weight[used], tone, bright, card)
-        )
+        colours = (skin_map[where] * shading + sheen)[used]
+        skins.append(LitSkin(colours, normals[used], weight[used], tone, bright, card))
     return skins
 
 
 @cache
 def _head():
-    """The built-in head's texels: bool [SIZE, SIZE] of those it covers; points and unit normals [N, 3], how far the sky
-    lights them [N, 9], its ray caster."""
+    """Return the built-in head's texels, as many as it covers of [SIZE, SIZE].
+
+    Covered (bool), points and unit normals [N, 3], how far the sky lights them [N, 9], the head's ray caster.
+    """
     mesh = template.load()
     face, bary = raster.rasterize_uv(mesh, SIZE)
     where = face >= 0
@@ -227,7 +215,7 @@ def _head():
 
 
 def photographed(lit_skin: LitSkin, rng: np.random.Generator) -> tuple[Look, np.ndarray]:
-    """What a phone shows of a scene, and of its card (linear [3])."""
+    """Return what a phone shows of a scene, and of its card (linear [3])."""
     gain = phone_exposure(rng, lit_skin.colours, lit_skin.light)
     colours = np.clip(lit_skin.colours * gain, 0, None)
     whole = (colours < 0.97).all(1)
@@ -236,7 +224,7 @@ def photographed(lit_skin: LitSkin, rng: np.random.Generator) -> tuple[Look, np.
 
 
 def fit_camera(scenes: list[LitSkin]) -> dict:
-    """The linear Gaussian model of what phones show of tones."""
+    """Fit the linear Gaussian model of what phones show of tones."""
     true, shown = [], []
     for each in scenes:
         for phone in range(PHONES):

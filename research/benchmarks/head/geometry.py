@@ -106,7 +106,7 @@ def run_stages(capture: Capture, source: Path) -> tuple[dict, dict | None]:
         print(f"{capture.root.stem}: stage {stage}", flush=True)
         cost = measure_stage(capture.root, stage, source.absolute())
         if "problem" in cost:
-            return costs, {"stage": stage, **cost, "remedy": ""}
+            return costs, {"stage": stage, **cost}
         costs[stage] = cost
         write_json(path, costs)
     return costs, None

@@ -9,7 +9,7 @@ from ..figures import Figures
 from ..pages import Sections, prose
 
 TITLE = "Time and memory"
-SAYS = "Each stage's seconds and peak memory at two qualities and for a long film, and an edited part."
+SAYS = "Seconds and peak memory of each stage at two qualities, and of an edited part."
 RECORDS = ("costs", "edited_part")
 
 
@@ -20,12 +20,12 @@ def sections(costs: Figures, part: Figures) -> Sections:
 def chain(costs: Figures) -> str:
     return prose(
         f"""
-        60 frames at standard quality take {costs.standard.together.minutes:.1f} minutes (asked for: 4), 300 frames
-        {costs["frames-300"].together.minutes:.1f} (7), a draft {costs.draft.together.minutes:.1f}.
+        60 frames at standard quality take {costs.standard.together.minutes:.1f} minutes (asked for: 4), a draft
+        {costs.draft.together.minutes:.1f}.
 
-        The sample video on two cores, without a GPU. Each stage runs in a process of its own; its seconds begin with
-        importing its libraries, and its peak memory holds them. A draft shares the standard quality's frames and
-        cameras; its total counts them. This processor ran the networks in bfloat16.
+        The sample video on two cores, without a GPU. Each stage is run by a worker of its own: its seconds begin with
+        starting Python and importing libraries, and its peak memory holds them. A draft shares the standard quality's
+        frames and cameras, and its total counts them.
         """,
         table(costs),
         """

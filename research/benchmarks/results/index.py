@@ -119,8 +119,7 @@ def headline(of: Figures) -> str:
         f"""
         The true skin tone is given to all; in the first column each picture gets one gain
         per channel on top. On sample and scan the filmed frames stand for their texture. A face takes
-        [{costs.standard.together.minutes:.1f} minutes on 2 cores](costs.md), of 300 frames
-        {costs["frames-300"].together.minutes:.1f}.
+        [{costs.standard.together.minutes:.1f} minutes on 2 cores](costs.md).
         """,
     )
 

@@ -12,6 +12,7 @@ from core.capture.messages import Reporter
 from research.people.lifelike import figure, unlit
 from research.people.lifelike.person import sample_person
 from research.training import eyes
+from research.training.descent import Run
 
 TINY = {"widths": [8, 8, 8, 8], "depths": [1, 1, 1, 1]}
 FIGURES, PARSER_VIEWS = (1000, 9000), 2
@@ -42,6 +43,6 @@ def eyes_work(scene, tmp_path_factory):
         patched.setitem(eyes.CONFIGS, "cpu", {"model": TINY, "training": options})
         patched.setattr(eyes, "make_figure", lambda person, texels: made.append(person) or scene.figure)
         for _ in range(2):
-            eyes.prepare_figures("cpu", folder, Reporter("train", emit=lambda message: None))
+            eyes.READER.prepare(Run("cpu", folder, folder), options, Reporter("train", emit=lambda message: None))
     assert len(made) == 2, "figures that are there are not made again"
     return folder

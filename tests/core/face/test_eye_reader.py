@@ -48,7 +48,7 @@ def test_an_example_is_a_right_eye(sights):
     for sight in sights:
         ball = sight.ball.astype(np.float32) / 255
         coded = np.concatenate([ball, ball[..., :1]], -1)  # a picture whose colours are its shares
-        layers, shares = training.make_example(coded, ball, sight, np.random.default_rng(0), augment=False)
+        layers, shares, _ = training.make_example(coded, ball, sight, np.random.default_rng(0), augment=False)
         assert np.abs(shares.sum(0) - 1).max() < 0.005
         white = shares[1] > 0.9
         assert layers[0][white].min() > layers[0][shares[0] > 0.99].max()
