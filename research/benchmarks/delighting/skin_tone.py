@@ -10,6 +10,7 @@ root mean square error of L*, mean delta E 2000, the stated deviation of L*, and
 those. A capture is a finished one with the sRGB of its true tone in a text file.
 """
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,7 @@ from ...people.pigment import reflectance
 from ...people.sample import RESERVED
 from ...training.seeds import HELD_OUT_SEED
 from ...training.tones import PHONES, photographed, scenes_of
-from ..figures import command_line, write_record
+from ..figures import command_line, markdown, write_record
 
 MOST = 400  # subjects looked at until each group has enough
 
@@ -50,26 +51,23 @@ def main() -> None:
         scenes = scenes_of(seed)
         name = name_group(scenes[0].tone)
         subjects[name] += 1
-        for light, scene in enumerate(scenes):
-            for phone in range(PHONES):
-                look, card = photographed(scene, np.random.default_rng([seed, light, phone, 33]))
-                for row, tone in (
-                    ("scene", estimate_from_scene(look.best, SCENE)),
-                    ("measured", estimate_from_white(look.front, card)),
-                ):
-                    rows[row].append((name, *errors(tone, scene.tone)))
-    print_table(rows, subjects)
-    captures = {}
+        for (light, scene), phone in product(enumerate(scenes), range(PHONES)):
+            look, card = photographed(scene, np.random.default_rng([seed, light, phone, 33]))
+            rows["scene"].append((name, *errors(estimate_from_scene(look.best, SCENE), scene.tone)))
+            rows["measured"].append((name, *errors(estimate_from_white(look.front, card), scene.tone)))
+    groups, captures = summary(rows, subjects), {}
+    lines = [
+        [row, name, found["subjects"], *(f"{value:.2f}" for value in found[row].values())]
+        for row in rows
+        for name, found in groups.items()
+        if row in found
+    ]
+    print(markdown(["row", "group", "subjects", "L* mean", "L* rms", "delta E", "stated", "within two"], lines))
     for folder, truth in options.capture:
         tone = np.array([float(v) for v in Path(truth).read_text(encoding="ascii").split("#")[0].split(",")])
         captures[Path(folder).stem] = of_capture(Capture(folder), tone)
-    write_record(
-        options.json,
-        "skin_tone",
-        "python -m research.benchmarks.delighting.skin_tone --each 14 [--capture CAPTURE TONE.txt]",
-        {"groups": summary(rows, subjects), "captures": captures},
-        keep=True,
-    )
+    command = "python -m research.benchmarks.delighting.skin_tone --each 14 [--capture CAPTURE TONE.txt]"
+    write_record(options.json, "skin_tone", command, {"groups": groups, "captures": captures}, keep=True)
 
 
 def expected(seed: int) -> str:
@@ -107,21 +105,6 @@ def summary(rows: dict[str, list], subjects: dict[str, int]) -> dict[str, dict]:
                 }
         found[name] = of_group
     return found
-
-
-def print_table(rows: dict[str, list], subjects: dict[str, int]) -> None:
-    print(
-        f"{'row':9} {'group':13} {'subjects':>8} {'L* mean':>8} {'L* rms':>7} {'delta E':>8} {'stated':>7} "
-        f"{'in two':>7}"
-    )
-    groups = summary(rows, subjects)
-    for row in rows:
-        for name, of_group in groups.items():
-            if of := of_group.get(row):
-                print(
-                    f"{row:9} {name:13} {of_group['subjects']:8} {of['lightness']:+8.2f} {of['rms']:7.2f} "
-                    f"{of['delta_e']:8.2f} {of['stated']:7.2f} {of['within_two']:7.2f}"
-                )
 
 
 def of_capture(capture: Capture, srgb: np.ndarray) -> dict:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measure the completed head and the hair's masks.
 
-    python -m research.benchmarks.head.whole_head [--seeds 9101 9102 ...] [--size 512] [--json OUT.json] [CAPTURE ...]
+    python -m research.benchmarks.head.whole_head [--seeds 9101 9102 ...] [--json OUT.json] [CAPTURE ...]
 
 Synthetic subjects (truth known everywhere, only the face seen), mean over the seeds, as {"fill", "completed"}; `fill`
 is what the solver gives where nobody looked, its mean face in the subject's tone:
@@ -44,6 +44,7 @@ from ...people.skin import make_skin
 from ..figures import command_line, write_record
 
 SEEDS = [9101, 9102, 9103, 9104, 9105, 9106]
+SIZE = 512  # texels along a side
 RINGS = (8.0, 11.0), (-6.0, -3.0), (22.0, 25.0)
 """mm inside the border: the seen side, the unseen side, and farther in."""
 
@@ -52,24 +53,17 @@ def main() -> None:
     parser = command_line(__doc__, "whole_head")
     parser.add_argument("captures", nargs="*", type=Path)
     parser.add_argument("--seeds", nargs="*", type=int, default=SEEDS)
-    parser.add_argument("--subject", type=int)
-    parser.add_argument("--size", type=int, default=512)
+    parser.add_argument("--subject", type=int, help="seed of the synthetic person that the captures show")
     options = parser.parse_args()
     found = {}
     if options.seeds:
-        surface = lay_out(template.load(), options.size)
-        rows = [{**whole(seed, surface), **hairs(seed, surface)} for seed in options.seeds]
-        found["synthetic"] = {name: _mean([row[name] for row in rows]) for name in rows[0]}
+        surface = lay_out(template.load(), SIZE)
+        found["synthetic"] = _mean([{**whole(seed, surface), **hairs(seed, surface)} for seed in options.seeds])
     for path in options.captures:
         found[path.stem] = of_capture(Capture(path), options.subject)
     print(json.dumps(found, indent=1))
-    write_record(
-        options.json,
-        "whole_head",
-        "python -m research.benchmarks.head.whole_head [--subject SEED] [CAPTURE]",
-        found,
-        keep=True,
-    )
+    command = "python -m research.benchmarks.head.whole_head [--subject SEED] [CAPTURE]"
+    write_record(options.json, "whole_head", command, found, keep=True)
 
 
 def whole(seed: int, surface: HeadSurface) -> dict:
@@ -90,13 +84,7 @@ def whole(seed: int, surface: HeadSurface) -> dict:
         specular=specular.astype(np.float32),
     )
     done, hidden = complete(cut, surface, Reporter("upscale"), seed), face < 0.02
-    row: dict = {}
-    for region in ("neck", "ears", "scalp"):
-        where = hidden & (template.mask(region, size) > 0.9)
-        row[region] = {
-            name: _error(*(_tone(m, surface) for m in (maps, truth)), where)
-            for name, maps in (("fill", cut), ("completed", done))
-        }
+    row = _tone_errors({"fill": cut, "completed": done}, truth, hidden, surface)
     near = hidden & (template.mask("neck", size) > 0.9) & (surface.texel < 1.5 * np.median(surface.texel))
     row["grain"] = {
         name: _grain(maps, near, surface) / _grain(truth, skin.numpy() > 0.99, surface)
@@ -140,18 +128,8 @@ def of_capture(capture: Capture, subject: int | None = None) -> dict:
     found = hair.find(done, surface)
     tones = {}
     if subject is not None:
-        truth, hidden = _painted(surface, subject), maps.confidence < 0.02
-
-        def error(maps, region: str):
-            where = hidden & (template.mask(region, surface.size) > 0.9)
-            return _error(*(_tone(m, surface) for m in (maps, truth)), where)
-
-        tones = {
-            "tone": {
-                region: {"fill": error(maps, region), "completed": error(done, region)}
-                for region in ("neck", "ears", "scalp")
-            }
-        }
+        states = {"fill": maps, "completed": done}
+        tones["tone"] = _tone_errors(states, _painted(surface, subject), maps.confidence < 0.02, surface)
     return {
         **tones,
         "completed_share_percent": report.figures["completed_share_percent"],
@@ -165,17 +143,20 @@ def of_capture(capture: Capture, subject: int | None = None) -> dict:
     }
 
 
+def _tone_errors(states: dict[str, HeadMaps], truth: HeadMaps, hidden: np.ndarray, surface: HeadSurface) -> dict:
+    """Return region -> state -> error of the hidden tone."""
+    tones, true = {name: _tone(maps, surface) for name, maps in states.items()}, _tone(truth, surface)
+    regions = {region: hidden & (template.mask(region, surface.size) > 0.9) for region in ("neck", "ears", "scalp")}
+    return {
+        region: {name: _error(tone, true, where) for name, tone in tones.items()} for region, where in regions.items()
+    }
+
+
 def _painted(surface: HeadSurface, seed: int, **changes) -> HeadMaps:
     skin = make_skin(replace(sample_parameters(seed), **changes), surface.size)
     one = np.ones((surface.size,) * 2, np.float32)
-    return HeadMaps(
-        skin.diffuse.astype(np.float32),
-        skin.normal.astype(np.float32),
-        skin.specular,
-        0.7 * one,
-        np.repeat(one[..., None], 3, 2),
-        one,
-    )
+    diffuse, normal = skin.diffuse.astype(np.float32), skin.normal.astype(np.float32)
+    return HeadMaps(diffuse, normal, skin.specular, 0.7 * one, np.repeat(one[..., None], 3, 2), one)
 
 
 def _step(maps: HeadMaps, ring: np.ndarray, next_ring: np.ndarray, surface: HeadSurface) -> float:

@@ -17,14 +17,6 @@ COLUMNS = {
     "detail": lambda s: s["detail"],
     "shadow step": lambda s: s["shadow_step"],
 }
-FORMATS = {
-    "PSNR": "{:.2f}",
-    "after one gain": "{:.2f}",
-    "SSIM": "{:.3f}",
-    "FLIP": "{:.3f}",
-    "detail": "{:.2f}",
-    "shadow step": "{:.2f}",
-}
 
 
 def means(subjects: list[dict]) -> dict:
@@ -122,4 +114,4 @@ def _badness(column: str, figure: float) -> float:
 
 
 def _text(column: str, figure: float | None) -> str:
-    return "-" if figure is None else FORMATS[column].format(figure)
+    return figures.number(figure, 3 if column in ("SSIM", "FLIP") else 2) or "-"

@@ -36,11 +36,11 @@ from ..captures.continued import begin_at_delight, run_stages
 from .albedo_score import compare, mean_scores, read_truth
 from .detail import FaceRays, cast_face_rays, centre_rays, marks, mean_of
 
-ROWS = ("average", "blend", "aligned", "perceptual", "delit")
+ROWS = ("average", "blend", "aligned", "perceptual")
 STEPS, SIZE, LEFT_OUT = 150, 1024, 4
 
 
-def measure_rows(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS) -> dict:
+def measure_rows(capture: Capture, truth: Path) -> dict:
     """Score the textures of a capture.
 
     Raises Problem where the capture is not registered or no true frame belongs to it."""
@@ -48,14 +48,14 @@ def measure_rows(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS) ->
         raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
     head, report, results = read_head(capture), Reporter("texture"), {}
     looks = looks_of(capture, head.caster, truth)
-    if "delit" in rows and any(capture.delit.glob("*.png")):
+    if any(capture.delit.glob("*.png")):
         results["delit"] = _row("aligned", *texture.observe_all(capture, head, SIZE, report)[:2], looks)
     with tempfile.TemporaryDirectory() as folder:
         copy = begin_at_delight(capture, Path(folder) / "copy.wildcap")
         delighter = from_json({"delight": {"delighter": "folder", "folder": str(truth.absolute() / "albedo")}})
         run_stages(copy, delighter, "delight")
         observations, surface, _ = texture.observe_all(copy, head, SIZE, report)
-        for row in (row for row in rows if row != "delit"):
+        for row in ROWS:
             try:
                 results[row] = _row(row, observations, surface, looks)
             except Problem as problem:  # the perceptual network is not everywhere; the other rows are

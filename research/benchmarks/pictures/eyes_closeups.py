@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draw Close-Up Eyes on six tones of skin, under three lights and in both engines, by the add-on's own buttons.
 
-    python -m research.benchmarks.pictures.eyes_closeups FOLDER docs/pictures/eyes_closeups.jpg [--resolution 192]
-        [--samples 16]
+    python -m research.benchmarks.pictures.eyes_closeups FOLDER docs/pictures/eyes_closeups.jpg
 
 A row for each person: the eye open, half closed and looking aside, and the mouth open. Cycles and EEVEE take turns as
 the squares of a chessboard do, Cycles first. The first and the fourth row are under Three-Point, the second and the

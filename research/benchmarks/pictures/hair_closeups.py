@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draw grown hair on six tones of skin, under three lights, by the add-on's own buttons.
 
-    python -m research.benchmarks.pictures.hair_closeups FOLDER docs/pictures/hair_closeups.jpg [--resolution 256]
-        [--samples 32]
+    python -m research.benchmarks.pictures.hair_closeups FOLDER docs/pictures/hair_closeups.jpg
 
 A row for each person: the albedo with its painted brow under the first light, then with brows and lashes grown over the
 skin below under all three, the eyes half open in the last.
