@@ -24,7 +24,7 @@ import numpy as np
 
 from core.face import faces, parser
 from core.face.parser_network import ParseNet
-from core.face.parts import PARTS, SIDE_PX, cut, inside, to_crop
+from core.face.parts import PARTS, cut, inside, to_crop
 from core.imaging import images
 
 from ...people.lifelike import snapshot, unlit
@@ -34,28 +34,17 @@ from ...people.lifelike.truth import Scene
 from ..captures.films import read_film
 from ..captures.likenesses import LIKENESSES
 from ..figures import command_line, markdown, number, write_record
+from ..pictures.sheet import in_rows
 
 VIEWS, SIZE, TEXELS = 8, 400, 1024
 SPARSE = 4.0
 HAIRS = ("brows", "beard", "hair")
 ENDINGS = (".png", ".jpg", ".jpeg")
-COLOURS = (
-    np.array(
-        [
-            [255, 190, 150],
-            [230, 0, 80],
-            [120, 60, 0],
-            [255, 150, 0],
-            [70, 70, 230],
-            [255, 255, 255],
-            [0, 160, 80],
-            [0, 0, 0],
-        ],
-        np.float32,
-    )
-    / 255
+COLOURS = np.float32(
+    [(255, 190, 150), (230, 0, 80), (120, 60, 0), (255, 150, 0), (70, 70, 230), (255,) * 3, (0, 160, 80), (0,) * 3]
 )
-"""Of the parts in a sheet."""
+COLOURS /= 255
+"""Colours of the parts in a sheet, in their order."""
 
 
 def main() -> None:
@@ -157,24 +146,18 @@ def _share(count: int, total: int) -> float | None:
 
 def write_sheet(out: Path, pictures: list[Path], network: ParseNet) -> None:
     """Draw the crops of photographs (files, or folders of them), their parts in colours, and both in one."""
+    paths = [path for each in pictures for path in (sorted(each.iterdir()) if each.is_dir() else [each])]
     rows = []
-    for path in [
-        path
-        for each in pictures
-        for path in (sorted(each.iterdir()) if each.is_dir() else [each])
-        if path.suffix.lower() in ENDINGS
-    ]:
+    for path in (path for path in paths if path.suffix.lower() in ENDINGS):
         srgb = images.read_srgb(path)[..., :3]
         face = faces.detect(srgb)
         if face is None:
             print(f"{path.name}: no face was found")
             continue
         crop = cut(srgb, to_crop(face.landmarks))
-        drawn = (parser.parse(srgb, face.landmarks, network).crop @ COLOURS).astype(np.float32)
-        rows.append(np.hstack([crop, drawn, 0.55 * crop + 0.45 * drawn]))
-    rows += [np.zeros((SIDE_PX, 3 * SIDE_PX, 3), np.float32)] * (-len(rows) % 2)
-    sheet = np.vstack([np.hstack(pair) for pair in zip(rows[0::2], rows[1::2], strict=True)])
-    images.write_srgb(out, sheet)
+        parts = (parser.parse(srgb, face.landmarks, network).crop @ COLOURS).astype(np.float32)
+        rows.append(np.hstack([crop, parts, 0.55 * crop + 0.45 * parts]))
+    images.write_srgb(out, in_rows(rows, 2))
 
 
 if __name__ == "__main__":

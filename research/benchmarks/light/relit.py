@@ -49,18 +49,6 @@ from .relit_maps import Worn, face_mask, read_rows, read_worn, worn_by, write_ro
 from .relit_renders import MARGIN
 
 LIGHTS = ("three_point", "window", "sun", "coloured", "city.exr", "interior.exr")
-ROWS = (
-    "raw",
-    "delit",
-    "solved",
-    "plain",
-    "no_relief",
-    "even_gloss",
-    "true_albedo",
-    "true_normal",
-    "true_specular",
-    "floor",
-)
 LABELS = {
     "raw": "filmed texture as albedo",
     "delit": "delit texture as albedo",
@@ -73,6 +61,7 @@ LABELS = {
     "true_specular": "solved, with the true specular albedo",
     "floor": "the truth, other random numbers",
 }
+ROWS = tuple(LABELS)
 SHOWN = ("truth", "solved", "delit", "raw")
 RESOLUTION, SAMPLES = 320, 16
 MIDDLE = 0.18
@@ -85,38 +74,24 @@ def main() -> int:
     parser.add_argument("--sample", type=Path)
     parser.add_argument("--people", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
-    parser.add_argument(
-        "--picture", type=Path, help="a JPEG of the first subject under all lights: truth, solved, delit, raw"
-    )
-    parser.add_argument("--lights", nargs="+", default=LIGHTS)
+    parser.add_argument("--picture", type=Path, help="a JPEG of the first subject under all lights")
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS)
-    arguments = parser.parse_args()
-    work, results = arguments.work.resolve(), {}
-    for subject in _subjects(arguments, work):
+    options = parser.parse_args()
+    work, means = options.work.resolve(), {}
+    for subject in _subjects(options, work):
         name = subject.name
-        render_rows(subject, work / name, arguments.lights, arguments.rows)
-        results[name] = score(work / name, arguments.lights, arguments.rows)
-        write_json(work / f"{name}.json", results[name])
-        print(f"{name}: {shortfall(mean_over_lights(results[name])) or 'as asked'}", file=sys.stderr)
-    if arguments.picture and results:
-        images.write_srgb(
-            arguments.picture,
-            side_by_side(
-                [images.read_srgb(work / next(iter(results)) / f"{Path(light).stem}.png") for light in arguments.lights]
-            ),
-            quality=86,
-        )
-    means = {name: mean_over_lights(found) for name, found in results.items()}
+        render_rows(subject, work / name, options.rows)
+        found = score(work / name, LIGHTS, options.rows)
+        write_json(work / f"{name}.json", found)
+        means[name] = mean_over_lights(found)
+        print(f"{name}: {shortfall(means[name]) or 'the goals are met'}", file=sys.stderr)
+    if options.picture and means:
+        pictures = [images.read_srgb(work / next(iter(means)) / f"{Path(light).stem}.png") for light in LIGHTS]
+        images.write_srgb(options.picture, side_by_side(pictures), quality=86)
     print(table(means))
-    if arguments.json:
-        source = (
-            "--sample .demo/sample.wildcap"
-            if arguments.sample
-            else f"--people FOLDER --rows {' '.join(arguments.rows)}"
-        )
-        figures.write_record(
-            arguments.json, "relit", f"python -m research.benchmarks.light.relit WORK {source}", with_mean(means)
-        )
+    source = "--sample .demo/sample.wildcap" if options.sample else f"--people FOLDER --rows {' '.join(options.rows)}"
+    command = f"python -m research.benchmarks.light.relit WORK {source}"
+    figures.write_record(options.json, "relit", command, with_mean(means))
     return 0
 
 
@@ -137,68 +112,50 @@ class RelitSubject:
         return worn_by(self.capture, read_worn(self.maps), head.moved(pose.apply(head.vertices)))
 
 
-def _subjects(arguments: argparse.Namespace, work: Path) -> Iterator[RelitSubject]:
+def _subjects(options: argparse.Namespace, work: Path) -> Iterator[RelitSubject]:
     """Return each subject that was asked for and has been solved."""
-    if arguments.sample:
+    if options.sample:
         maps = work / "sample_truth"
         if not (maps / "normal.png").exists():  # written last
             write_maps(maps, make_skin(sample_parameters(sample.RESERVED["sample"]), sample.MAPS))
         truth = Path(sample.__file__).parent / "sample"
-        yield RelitSubject("sample", Capture(arguments.sample.resolve()), maps, truth, sample.RESERVED["sample"])
-    for person in (p for p in PEOPLE if arguments.people and p.name in arguments.only):
-        capture = Capture(arguments.people.resolve() / f"{person.name}.wildcap")
+        yield RelitSubject("sample", Capture(options.sample.resolve()), maps, truth, sample.RESERVED["sample"])
+    for person in (p for p in PEOPLE if options.people and p.name in options.only):
+        capture = Capture(options.people.resolve() / f"{person.name}.wildcap")
         if (capture.maps / "normal.png").is_file():
-            truth = arguments.people.resolve() / person.name
+            truth = options.people.resolve() / person.name
             yield RelitSubject(person.name, capture, truth / "maps", truth, person.seed)
         else:
             print(f"{person.name} has not been solved and is left out.", file=sys.stderr)
 
 
-def render_rows(subject: RelitSubject, work: Path, lights: list[str], row_names: list[str]) -> None:
+def render_rows(subject: RelitSubject, work: Path, row_names: list[str]) -> None:
     """Render the truth and rows, unless the pictures are newer than what they show."""
-    capture, truth = subject.capture, subject.maps
-    renders, mask = work / "renders", work / "mask.png"
+    capture, renders, mask = subject.capture, work / "renders", work / "mask.png"
     renders.mkdir(parents=True, exist_ok=True)
-    pictures = [
-        renders / name
-        for name in (
-            *(f"{row}_{Path(light).stem}.exr" for row in ("truth", *row_names) for light in lights),
-            "face.exr",
-        )
-    ]
-    old = [picture for picture in pictures if not is_newer(picture, capture, truth)]
+    chosen = ("truth", *row_names)
+    names = ["face.exr", *(f"{row}_{Path(light).stem}.exr" for row in chosen for light in LIGHTS)]
+    old = [renders / name for name in names if not is_newer(renders / name, capture, subject.maps)]
     if not old:
         return
-    for picture in old:  # what is there would be kept
+    for picture in old:  # the renderer keeps existing files
         picture.unlink(missing_ok=True)
     face_mask(mask)
     rows = []
     for name, worn in read_rows(capture, subject.worn()).items():
-        if name not in ("truth", *row_names):
-            continue
-        folder = work / f"{name}.wildcap"
-        write_row(folder, capture, worn)
-        rows.append({"name": name, "capture": str(folder), "seed": int(name == "floor")})
-    write_json(
-        work / "job.json",
-        {
-            "rows": rows,
-            "lights": list(lights),
-            "out": str(renders),
-            "mask": str(mask),
-            "resolution": RESOLUTION,
-            "samples": SAMPLES,
-        },
-    )
+        if name in chosen:
+            folder = work / f"{name}.wildcap"
+            write_row(folder, capture, worn)
+            rows.append({"name": name, "capture": str(folder), "seed": int(name == "floor")})
+    job = {"rows": rows, "lights": LIGHTS, "out": str(renders), "mask": str(mask)}
+    write_json(work / "job.json", {**job, "resolution": RESOLUTION, "samples": SAMPLES})
     if figures.run_python("research.benchmarks.light.relit_renders", work / "job.json", quiet=True):
         raise SystemExit("The renders failed.")
 
 
 def is_newer(picture: Path, capture: Capture, truth: Path) -> bool:
     """Return True if a render was made after the capture's maps, textures and head, and the true maps."""
-    shown = [
-        path for folder in (capture.maps, capture.maps_4k, truth) if folder.is_dir() for path in folder.glob("*.png")
-    ]
+    shown = [path for folder in (capture.maps, capture.maps_4k, truth) for path in folder.glob("*.png")]
     shown += [path for path in (capture.head, capture.texture, capture.texture_filmed) if path.is_file()]
     return picture.is_file() and picture.stat().st_mtime >= max((path.stat().st_mtime for path in shown), default=0.0)
 

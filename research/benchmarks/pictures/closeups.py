@@ -47,38 +47,30 @@ class CloseUp:
 Shots = Callable[[str], dict[str, CloseUp]]
 
 
-def run_closeups(module: str, description: str, shots: Shots, resolution: int, samples: int) -> None:
+def run_closeups(module: str, description: str, shots: Shots) -> None:
     """Run the command of a module of close-ups: a row of pictures for each person.
 
-    shots: name of a person -> name of a picture -> its content; resolution: default pixels of a side.
+    shots: name of a person -> name of a picture -> its content.
     """
     parser = command_line(description)
     parser.add_argument("folder", type=Path, help="keeps captures and renders; finished renders are taken as they are")
     parser.add_argument("out", type=Path)
     parser.add_argument("--only", nargs="+", metavar="NAME", help="of the six people")
-    parser.add_argument("--resolution", type=int, default=resolution, help="pixels of a picture's side")
-    parser.add_argument("--samples", type=int, default=samples)
     options = parser.parse_args()
     from core.imaging import images
 
     from ..captures.people import PEOPLE
     from .sheet import write_small
 
-    captures = [
-        prepare(options.folder, person.name, person.seed)
-        for person in PEOPLE
-        if person.name in (options.only or [person.name])
-    ]
     rows = []
-    # each in a process of its own: what EEVEE has compiled for one head, it does not give back
-    for capture in captures:
-        words = (f"{__package__}.{module}", capture, options.resolution, options.samples)
-        if code := run_python(f"{__package__}.closeups", *words):
+    for person in (person for person in PEOPLE if person.name in (options.only or [person.name])):
+        capture = prepare(options.folder, person.name, person.seed)
+        # in a process of its own: EEVEE does not give back what it has compiled for a head
+        if code := run_python(f"{__package__}.closeups", f"{__package__}.{module}", capture):
             raise SystemExit(code)
-        rows.append(
-            np.concatenate([images.read_srgb(capture / "renders" / f"{name}.png") for name in shots(capture.stem)], 1)
-        )
-    write_small(options.out, np.concatenate(rows))
+        paths = [capture / "renders" / f"{name}.png" for name in shots(capture.stem)]
+        rows.append(np.hstack([images.read_srgb(path) for path in paths]))
+    write_small(options.out, np.vstack(rows))
 
 
 def prepare(folder: Path, name: str, seed: int) -> Path:
@@ -178,9 +170,9 @@ def aim(camera, obj, shot: CloseUp) -> None:
 
 
 def main() -> None:
-    """One capture's renders: MODULE CAPTURE RESOLUTION SAMPLES."""
-    module, root, resolution, samples = sys.argv[1:]
-    render_closeups(Path(root), importlib.import_module(module).shots(Path(root).stem), int(resolution), int(samples))
+    """Render one capture's close-ups: MODULE CAPTURE."""
+    module, root = importlib.import_module(sys.argv[1]), Path(sys.argv[2])
+    render_closeups(root, module.shots(root.stem), module.RESOLUTION, module.SAMPLES)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ fifth under Overcast, the third and the sixth under Sun.
 from ..captures.people import PEOPLE
 from .closeups import LIGHTS, CloseUp, run_closeups
 
+RESOLUTION, SAMPLES = 192, 16
 ENGINES = ("CYCLES", "EEVEE")
 IRISES = ("blue", "green", "hazel", "grey", "brown", "brown")
 """Of the six people, from light to dark: nobody filmed theirs."""
@@ -42,4 +43,4 @@ def shots(name: str) -> dict[str, CloseUp]:
 
 
 if __name__ == "__main__":
-    run_closeups("eyes_closeups", __doc__, shots, resolution=192, samples=16)
+    run_closeups("eyes_closeups", __doc__, shots)

@@ -23,7 +23,7 @@ from core.geometry.views import View, read_views
 from core.imaging import images
 
 from ..figures import command_line, run_python
-from .sheet import in_rows, write_small
+from .sheet import in_rows, texture_and_mask, write_small
 
 LIGHTS = ("three_point", "window", "sun", "city.exr")
 TILE, RESOLUTION, SAMPLES = 224, 320, 24  # pixels, pixels, rays per pixel
@@ -43,18 +43,16 @@ def main() -> None:
 
 def captured(capture: Capture) -> list[np.ndarray]:
     """Return frame and delit frame about the face, texture, and mask over the texture: sRGB, square."""
-    views = read_views(capture, selected_only=True)
     head = meshes.read_obj(capture.head)
-    # from the front
-    view = max((v for v in views if (capture.delit / f"{Path(v.name).stem}.png").is_file()), key=lambda v: v.axis[1])
+    delit = {
+        view.name: capture.delit / f"{Path(view.name).stem}.png" for view in read_views(capture, selected_only=True)
+    }
+    views = [view for view in read_views(capture, selected_only=True) if delit[view.name].is_file()]
+    view = max(views, key=lambda view: view.axis[1])  # from the front
     box = face_square(view, head)
     # a delighter knows nothing of what is behind the head
     cover = (raster.render_view(raster.RayCaster(head), view)[0] >= 0)[..., None]
-    texture = images.read_srgb(capture.texture_png)
-    mask = images.read_mask(capture.shadow_mask if capture.shadow_mask.exists() else capture.shadow_mask_auto)
-    mask = images.resize(mask, texture.shape[1], texture.shape[0])[..., None]
-    delit = images.read_srgb(capture.delit / f"{Path(view.name).stem}.png") * cover
-    return [view.read()[box], delit[box], texture, texture * (1 - 0.6 * mask) + mask * np.float32([0.6, 0, 0])]
+    return [view.read()[box], (images.read_srgb(delit[view.name]) * cover)[box], *texture_and_mask(capture)]
 
 
 def solved(capture: Capture, truth: Path | None) -> list[np.ndarray]:

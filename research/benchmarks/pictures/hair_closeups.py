@@ -10,6 +10,7 @@ skin below under all three, the eyes half open in the last.
 
 from .closeups import LIGHTS, CloseUp, run_closeups
 
+RESOLUTION, SAMPLES = 256, 32
 HALF_OPEN = 0.5
 BROW = {"at": "eye", "above_m": 0.008, "way": (0.35, -1.0, 0.1), "lens_mm": 220.0}
 
@@ -21,4 +22,4 @@ def shots(_name: str) -> dict[str, CloseUp]:
 
 
 if __name__ == "__main__":
-    run_closeups("hair_closeups", __doc__, shots, resolution=256, samples=32)
+    run_closeups("hair_closeups", __doc__, shots)
