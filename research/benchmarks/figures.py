@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shape that all benchmarks share: a command line, a record of figures, tables in Markdown.
+"""Shape that all benchmarks share: a command line, a record of figures, tables in Markdown.
 
 A record is {"benchmark", "command", "commit", "date", "machine", "figures"}, one JSON file each, written where --json
 says. The published ones are research/records/NAME.json, from which the pages of docs/results are written

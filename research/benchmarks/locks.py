@@ -31,7 +31,7 @@ NOT_VERIFIED = (
 )
 PIP = "26.3"
 TEMPORARY = ".0123456789012345"
-"""What Python appends to a compiled file's name while it writes it: a dot and a number of 15 digits or so."""
+"""Suffix that Python appends to a compiled file's name while it writes it: a dot and a number of 15 digits or so."""
 COMPILED = 1.25
 """Bytes of compiled Python for each of source, which pip adds (PyTorch's and SciPy's: 1.20 and 1.38)."""
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Self-Test expects, after the sample head, the prior or the solver has changed.
+"""Measure the score that Self-Test expects, after the sample head, the prior or the solver has changed.
 
     python -m research.benchmarks.self_test [COUNT]
 

@@ -176,7 +176,7 @@ def test_a_checkpoint_that_did_not_fit_on_the_disk_is_told_by_name(tmp_path, mon
 
 
 def with_limit(most_bytes: int, attempt) -> str:
-    """The problem of an attempt, in a process of its own in which no file may be longer; '' for none."""
+    """Problem of an attempt, in a process of its own in which no file may be longer; '' for none."""
 
     def work() -> str:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The people that benchmarks photograph, and the measure of relit heads: answers known beforehand."""
+"""People that benchmarks photograph, and the measure of relit heads: answers known beforehand."""
 
 import os
 from dataclasses import replace
@@ -27,7 +27,7 @@ SIZE = 16
 
 @pytest.fixture
 def maps():
-    """What a solver found and the truth, each map of another value throughout."""
+    """Solved and true maps, each of another value throughout."""
 
     def worn(albedo, tilt, gloss):
         normal = np.broadcast_to(np.float32([tilt, 0, np.sqrt(1 - tilt**2)]), (SIZE, SIZE, 3))
@@ -76,7 +76,7 @@ def test_each_swapped_row_takes_one_true_map_and_no_other(maps):
 
 
 def test_the_registered_head_wears_what_lies_where_its_surface_is_and_its_own_elsewhere(tmp_path):
-    """The subject's surface is the head's, its UVs lie a fortieth of the map to the right; a subject a metre away has
+    """Subject's surface is the head's, its UVs lie a fortieth of the map to the right; a subject a metre away has
     nothing to give."""
     mesh, u = template.load(), np.tile((np.arange(128) + 0.5) / 128, (128, 1)).astype(np.float32)
     capture = Capture(tmp_path / "a.wildcap")

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The state's figures on maps and looks whose answers are known, its captures by person, and figures that are kept."""
+"""State's figures on maps and looks whose answers are known, its captures by person, and figures that are kept."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +29,7 @@ SKIN = np.float32([0.45, 0.28, 0.2])
 
 @dataclass
 class Drawn:
-    """What state_scores asks of a capture."""
+    """Stand-in for a capture in state_scores."""
 
     name: str
     where: np.ndarray

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The captures and solves of research/benchmarks/light/controlled.py: a flash in the dark, even light, true frames.
+"""Captures and solves of research/benchmarks/light/controlled.py: a flash in the dark, even light, true frames.
 
 Each begins from frames, cameras and head of a capture of research/benchmarks/captures/people.py, works in a copy that
 is made once, and leaves an albedo map in the same UVs.

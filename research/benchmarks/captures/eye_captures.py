@@ -37,7 +37,7 @@ EYES = {
 measured on them."""
 FRAMES, SAMPLES, SCALE = 10, 4, 5 / 6
 WHITE, TO = 97, 0.8
-"""Which percentile of the frames comes to how bright a pixel."""
+"""Percentile of the frames, and the level that it is brought to."""
 
 
 def main() -> None:

@@ -45,7 +45,7 @@ LIKENESSES = (
     Likeness("stubbled", 910004, "noon sun behind leaves"),
     Likeness("closed", 910001, "mixed lamps"),
 )
-"""The first seed from 910001 on with: cropped hair and a full beard; long hair with a fringe; short hair and stubble;
+"""First seed from 910001 on with: cropped hair and a full beard; long hair with a fringe; short hair and stubble;
 closed lids. None was chosen by eye."""
 HELD_BACK = (
     Likeness("bearded_2", 920033, "noon sun behind leaves"),

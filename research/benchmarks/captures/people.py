@@ -55,7 +55,7 @@ PEOPLE = (
     FilmedPerson("brown", 900101, "hazy sun"),
     FilmedPerson("dark", 900102, "noon sun behind leaves"),
 )
-"""The first seed from 900101 on in each group: nothing was chosen by eye. reserved.json keeps them from training."""
+"""First seed from 900101 on in each group: nothing was chosen by eye. reserved.json keeps them from training."""
 PLACES = ("wild", "flash", "studio")
 FRAMES, SCALE, SAMPLES = 40, 5 / 6, 7  # of the video, their size (600 x 800), rays per pixel before denoising
 # of the video's cameras so many are taken again with the lamp; only its place matters, as frames are exposed

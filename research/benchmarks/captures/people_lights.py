@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The light of the synthetic people: from overcast to noon sun behind leaves, window bars and mixed lamps.
+"""Light of the synthetic people: from overcast to noon sun behind leaves, window bars and mixed lamps.
 
 World: metres, +Z up, the head's middle at the origin, its face towards -Y. Radiance is linear; the camera chooses the
 exposure.
@@ -74,7 +74,7 @@ KINDS = {
     "hazy sun": haze,
 }
 FURTHER = {"overcast": overcast, "lamp from below": lamp_below}
-"""The lights in which every person is photographed again (research/benchmarks/captures/likenesses.py)."""
+"""Lights in which every person is photographed again (research/benchmarks/captures/likenesses.py)."""
 
 
 def panorama(zenith, horizon, ground) -> np.ndarray:

@@ -130,7 +130,7 @@ def face_of(data: Path, head: Mesh) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LitScan:
-    """The scan ready for rays.
+    """Scan ready for rays.
 
     opaque: with all that throws shadows; albedo: linear [S, S, 3]; facial [V] in [0, 1]: share of facial skin of each
     vertex; sun [3]: unit direction to it, None without one.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The captures that research/benchmarks/delighting/state.py measures, as maps in the UVs of their heads.
+"""Captures that research/benchmarks/delighting/state.py measures, as maps in the UVs of their heads.
 
 A folder holds NAME.wildcap and beside it, or in another folder, NAME/ with the truth
 (research/benchmarks/maps/albedo_score.py says its layout; head.obj, the true head, tells which captures show the same

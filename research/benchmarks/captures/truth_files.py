@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The files of a rendered capture's truth, in the layout that research/benchmarks/maps/albedo_score.py reads."""
+"""Files of a rendered capture's truth, in the layout that research/benchmarks/maps/albedo_score.py reads."""
 
 from pathlib import Path
 

@@ -57,7 +57,7 @@ ROWS = {
     "with_fitted": "evened out and fitted light",
     "together": "put together",
 }
-"""What is told apart, and its heading."""
+"""Columns of the table, and their headings."""
 ANSWERS = ("true", "alone", "frames", "fitted", "together")
 
 

@@ -117,7 +117,7 @@ def answer_photograph(srgb: np.ndarray, albedo: np.ndarray, lit: np.ndarray, del
     """Return all answers to one photograph. A picture that the delighter refuses is taken as it is, as an artist would.
 
     srgb: [H, W, 3]; albedo: [H, W, 3], linear, the truth; lit: bool [H, W], the pixels of the face that show
-    something. Returns Answer -> linear albedo [H, W, 3]."""
+    something. Returns answer -> linear albedo [H, W, 3]."""
     linear = images.srgb_to_linear(srgb)
     try:
         answer = delight.PHOTOGRAPHERS[delighter](srgb, Settings().delight)[0]

@@ -40,7 +40,7 @@ LONDON = {
     "003": "white",
     "004": "white",
 }
-"""The first people of each group in london_info.csv, women and men; the group as they named it themselves."""
+"""First people of each group in london_info.csv, women and men; the group as they named it themselves."""
 GROUNDS = {"white": 1.0, "black": 0.02}  # sRGB
 OLAT = {"049": "Cam06", "071": "Cam07"}
 OLAT_LIGHTS = ("000", "004", "008")

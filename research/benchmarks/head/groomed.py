@@ -49,7 +49,7 @@ AROUND_MM, AMOUNT_MM = 1.0, 3.0
 """Deviations in mm of the surroundings in which hair is said to cover a pixel or not, and of those in which it is said
 how much it covers."""
 SOWN = {"brows": brows.grow_brows, "beard": beards.grow_beard}
-"""The rules by which the people have their hair."""
+"""Rules by which the people have their hair."""
 WANTED_IOU, WANTED_DEGREES = 0.7, 20
 COMMAND = "python -m research.benchmarks.head.groomed FOLDER --json research/records/groomed.json"
 CHOSEN_ON, TRUSTS, TURNS = (3, 5, 13), (0.03, 0.1, 0.3, 1.0, 3.0), (-40, 0, 40)
@@ -147,7 +147,7 @@ def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
     for part in (part for part in ("brows", "beard") if part in true or part in grown):
         row = {"true_hairs": _count(true.get(part)), "grown_hairs": _count(grown.get(part))}
         row["iou"], row["amount"] = overlaps(figure, judged, true.get(part), grown.get(part))
-        row["parser_iou"] = _told(figure, shown, part)
+        row["parser_iou"] = _parser_iou(figure, shown, part)
         if part in true:
             row["iou_anew"], row["amount_anew"] = overlaps(figure, judged, true[part], sow_anew(figure, part))
         if part in true and part in grown:
@@ -234,7 +234,7 @@ def sow_anew(figure: Figure, part: str) -> Strands:
     )
 
 
-def _told(figure: Figure, parts_shown: PartsShown, part: str) -> float:
+def _parser_iou(figure: Figure, parts_shown: PartsShown, part: str) -> float:
     """Return the intersection over union of the parser's texels (more than half) and those where such hair grows."""
     grows = (
         images.resize(figure.growth[part], SIZE, SIZE) > 0.25 if part in figure.growth else np.zeros((SIZE, SIZE), bool)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The kinds of hostile cases: what is spoiled, and the command that reads it."""
+"""Kinds of hostile cases: what is spoiled, and the command that reads it."""
 
 import json
 import os
@@ -93,7 +93,7 @@ class Case:
 
 
 class Stock:
-    """The undisturbed run, and files as users bring them: a film, photographs, masks, landmarks, cameras, a mesh."""
+    """Undisturbed run, and files as users bring them: a film, photographs, masks, landmarks, cameras, a mesh."""
 
     def __init__(self, undisturbed: Undisturbed, folder: Path):
         self.undisturbed, self.folder, end = undisturbed, folder, undisturbed.end
@@ -218,7 +218,7 @@ def odd_name(case: Case, stock: Stock, rng: random.Random) -> None:
 
 @dataclass(frozen=True)
 class Kind:
-    """How a case is made of a fresh copy of the finished capture, how often, and the stage that must have run."""
+    """Function that makes a case of a copy of the finished capture, its weight, and the stage that must have run."""
 
     make: Callable[[Case, Stock, random.Random], None]
     weight: int = 4

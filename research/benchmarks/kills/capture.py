@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The small capture that is killed: eight frames of the sample video with their true cameras, run once undisturbed.
+"""Small capture that is killed: eight frames of the sample video with their true cameras, run once undisturbed.
 
 A place is a folder with the capture face.wildcap, a file of the user's beside it, and deliveries. The place is kept as
 it was before each stage and at the end, and, on demand, after a stage was run with other settings.
@@ -32,7 +32,7 @@ SETTINGS = {
     "upscale": {"size": 1024, "method": "lanczos"},
     "transfer": {"scan_size": 256, "scan_detail_mm": 10.0},
 }
-"""The least work of every stage."""
+"""Least work of every stage."""
 OTHER = {
     "frames": {"long_side": 352},
     "cameras": {"interpupillary_mm": 64.0},
@@ -57,12 +57,12 @@ STRANGERS = {
         "mask_history/notes.txt preview/notes.txt logs/mine.txt"
     ).split()
 }
-"""The user's files in the capture: name -> content."""
+"""User's files in the capture: name -> content."""
 GUESTS = {
     name: f"This is {name}, and no delivery's.\n".encode()
     for name in ("render.txt", "textures/painted.psd", ".look/shader.ma")
 }
-"""The user's files in the folder of a delivery."""
+"""User's files in the folder of a delivery."""
 BESIDE = "anna.txt"
 
 

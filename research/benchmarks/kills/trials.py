@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The kinds of trial: what begins in a place, what strikes it, and what must hold afterwards."""
+"""Kinds of trial: what begins in a place, what strikes it, and what must hold afterwards."""
 
 import importlib
 import json
@@ -44,7 +44,7 @@ COLMAP_S, PARTING_S = 2.5, 5.0
 
 @dataclass
 class KillTrial:
-    """The course and the faults of one trial; `where` tells what was struck and when.
+    """Course and the faults of one trial; `where` tells what was struck and when.
 
     private: whether full disks are disks of their own.
     """
@@ -354,7 +354,7 @@ def _holder(lock: Path) -> int | None:
 
 @dataclass(frozen=True)
 class Kind:
-    """How a trial runs, how often it is in a round, and the stage up to which the chain must have run."""
+    """Function of a trial, its number in a round, and the stage up to which the chain must have run."""
 
     run: Callable[[KillTrial], None]
     weight: int

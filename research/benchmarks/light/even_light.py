@@ -29,7 +29,7 @@ TONES = {
 groups)."""
 WAYS = ("random walk", "random walk (skin)", "WildCap Skin")
 RADIUS_M, SEEN_M = 0.09, 0.012
-"""The sphere's radius and the side of what is seen of it: Cycles takes scattering that is shorter than a pixel for
+"""Sphere's radius and the side of what is seen of it: Cycles takes scattering that is shorter than a pixel for
 none."""
 SIDE, SAMPLES = 32, 256
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The heads that research/benchmarks/light/relit.py renders: captures of one head with the maps of each row.
+"""Heads that research/benchmarks/light/relit.py renders: captures of one head with the maps of each row.
 
 All rows share the registered head, so that pixels can be compared. It wears the true maps where its surface lies on the
 true head, not where their UVs agree: these are a millimetre apart, by which all fine detail would count as an error.
@@ -48,7 +48,7 @@ class Worn:
 def make_rows(raw: np.ndarray, delit: np.ndarray, solved: Worn, true: Worn, skin: np.ndarray) -> dict[str, Worn]:
     """Return the table's rows, whose albedos share one mean.
 
-    raw, delit: textures, linear [S, S, 3]; skin: [S, S], weight of the texels of that mean. Returns Name -> maps."""
+    raw, delit: textures, linear [S, S, 3]; skin: [S, S], weight of the texels of that mean. Returns name -> maps."""
     even = np.full_like(solved.specular, (solved.specular * skin).sum() / skin.sum())
     flat = np.broadcast_to(np.float32([0, 0, 1]), solved.normal.shape)
     tone = (true.albedo * skin[..., None]).sum((0, 1)) / skin.sum()

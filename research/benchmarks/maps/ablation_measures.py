@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The ablation's figures of a solved albedo, region by region, and their table."""
+"""Ablation's figures of a solved albedo, region by region, and their table."""
 
 from functools import cache
 
@@ -26,7 +26,7 @@ def measure_regions(
 ) -> dict[str, dict[str, float]]:
     """Compare an albedo with the truth in sRGB, after the gain per channel (linear) that is best for the whole face.
 
-    albedo, truth: linear [S, S, 3]; face: bool [S, S]; regions: name -> bool [S, S]. Returns Region -> figures: PSNR
+    albedo, truth: linear [S, S, 3]; face: bool [S, S]; regions: name -> bool [S, S]. Returns region -> figures: PSNR
     in dB, SSIM, FLIP and the feature distance (where its network is installed)."""
     gain = (albedo[face] * truth[face]).sum(0) / (albedo[face] ** 2).sum(0)
     ours = images.linear_to_srgb(albedo * gain).astype(np.float32)

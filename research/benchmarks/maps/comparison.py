@@ -131,7 +131,7 @@ def solve_by_method(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Solve a capture by one method.
 
-    Returns Diffuse albedo and shading, linear [S, S, 3], and the seconds that it took."""
+    Returns diffuse albedo and shading, linear [S, S, 3], and the seconds that it took."""
     began = time.monotonic()
     head = read_head(capture)
     evidence = read_evidence(capture, head, settings.solve.size)

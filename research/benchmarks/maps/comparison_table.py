@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tables of research/benchmarks/maps/comparison.py."""
+"""Tables of research/benchmarks/maps/comparison.py."""
 
 import numpy as np
 

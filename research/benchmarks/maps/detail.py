@@ -26,7 +26,7 @@ MOLE_PX = (1.2, 5.0)
 MOLE_DEPTH = 0.05
 """Least depth of a mole in that band, as a difference of logarithms (5 %)."""
 MOLES = 60
-"""The deepest of a frame's moles are used, this many at most."""
+"""Deepest of a frame's moles are used, this many at most."""
 PORE_PX = (0.7, 2.0)
 
 

@@ -84,9 +84,9 @@ def show_samples(options: argparse.Namespace) -> None:
     for (row, column), sampled, skin_tone in zip(corner, albedo, tone, strict=True):
         patches = []
         for maps, own in zip(skins.maps[COARSE], skins.tones, strict=True):
-            for left in (column, side - column - PATCH):
+            for left, mirrored in ((column, False), (side - column - PATCH, True)):
                 patch = (maps[:3, row : row + PATCH, left : left + PATCH].float() + 1) / 2 / own[:, None, None]
-                patches.append(patch if left == column else patch.flip(2))
+                patches.append(patch.flip(2) if mirrored else patch)
         patches = torch.stack(patches)
         distance = (patches - sampled / skin_tone[:, None, None]).pow(2).mean((1, 2, 3)).sqrt()
         nearest = patches[int(distance.argmin())]

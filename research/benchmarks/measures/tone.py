@@ -7,7 +7,7 @@ import numpy as np
 from core.imaging import images
 
 BEST_PSNR = 60.0
-"""What two equal pictures get, in dB, and all that differ by less than eight bits can tell: a mean over people stays
+"""PSNR of two equal pictures, in dB, and of all that differ by less than eight bits can tell: a mean over people stays
 one."""
 
 

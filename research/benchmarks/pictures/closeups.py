@@ -18,13 +18,13 @@ from ..figures import command_line, run_python
 
 LIGHTS = ("three_point", "overcast", "sun")
 SEAMS = {"mouth": 0, "eye": 1}
-"""Where the camera looks: the middle of what the face units cut open there (the eye on the person's left)."""
+"""Points that the camera looks at: the middle of the seam of mouth or eye (the eye on the person's left)."""
 EEVEE_SAMPLES = 32
 
 
 @dataclass(frozen=True)
 class CloseUp:
-    """The content of a picture.
+    """Content of a picture.
 
     opened: how far the eyes are open; units: face units and their values; at: one of SEAMS, `above_m` metres above it,
     seen from `away_m` metres away on the side `way` [3] in the head's axes through a lens of `lens_mm`.

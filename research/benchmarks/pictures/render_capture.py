@@ -18,7 +18,7 @@ from ...people.blender_module import without_numpy_1
 from ..figures import ROOT, command_line
 
 EXTENSION = "bl_ext.user_default.wildcap"
-"""The checkout's name in Blender, the very one that users get."""
+"""Checkout's name in Blender, the very one that users get."""
 
 
 def main() -> None:

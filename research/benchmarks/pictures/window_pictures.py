@@ -37,9 +37,9 @@ class WindowPicture:
 
 
 QUESTION, PANEL = (0.005, 0.38, 0.397, 0.66), (0.605, 0.1, 0.825, 0.38)
-"""The dialog over the 3D view, and the tab with its neighbours' names."""
+"""Dialog over the 3D view, and the tab with its neighbours' names."""
 HEAD = (0.285, 0.13, 0.54, 0.8)
-"""The head in the 3D view, between its tools and the sidebar."""
+"""Head in the 3D view, between its tools and the sidebar."""
 PICTURES = {
     "paint_on_head": WindowPicture(("4_stroke_on_head",), 1280),
     "paint_on_sheet": WindowPicture(("5_stroke_on_sheet",), 1280),

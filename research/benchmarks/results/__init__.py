@@ -26,7 +26,7 @@ from ..pages import page_text, replace_text
 
 ROOT = figures.ROOT
 NAMES = tuple(module.name for module in iter_modules(__path__) if module.name != "__main__")
-"""The pages' names."""
+"""Pages' names."""
 
 
 def main() -> int:
