@@ -6,16 +6,12 @@
         FOLDER]
     python -m research.benchmarks.captures.likenesses FOLDER --sheet docs/pictures/people.jpg [--facekit FOLDER]
 
-FOLDER/NAME has the video, capture.mp4, and the truth in the layout that research/benchmarks/maps/albedo_score.py says,
-with bare/ (albedo without hair), parts/, normal/, strands_*.npz, opened.obj, maps/ and light.json besides. In its own
-light a person sits in a room, and the chain begins with the video:
-
-    python -m core run FOLDER/NAME/capture.mp4 FOLDER/NAME.wildcap
-
-NAME_overcast and NAME_below have nothing behind the person and true cameras: FOLDER/NAME_overcast.wildcap begins at
-delight. So do those of the bald people; who was in overcast light before is photographed in hazy sun. What is there is
-not made again. With --facekit (ICT-FaceKit's folder) the heads' shape is derived from it too; without, they are other
-heads of the same people.
+FOLDER/NAME has capture.mp4 and the truth in the layout that research/benchmarks/maps/albedo_score.py reads, with bare/
+(albedo without hair), parts/, normal/, strands_*.npz, opened.obj, maps/ and light.json. In its own light a person sits
+in a room, and the chain begins with the video. NAME_overcast and NAME_below have nothing behind the person and true
+cameras, and begin at delight, as those of the bald people; who was in overcast light before is in hazy sun. Nothing is
+made twice. With --facekit (ICT-FaceKit's folder) the heads' shape is derived from it too; without, they are other heads
+of the same people.
 """
 
 import time

@@ -9,15 +9,9 @@
 Sets: faceolat (--data: laid out like ../shared/data/faceolat), portraits (synthetic subjects that no training sees, six
 per group of skin tone, two lights each), lps_sun, sample, or any folder laid out as
 research/benchmarks/maps/albedo_score.py says. A capture is registered anew unless --capture names one. Rows: none, flat
-true tone, then on captures each delighter of the chain that needs no pictures, no account and no checkpoint, and
-everywhere each that can do a single photograph. Figures (research/benchmarks/delighting/delight_measures.py) are means
-over the pictures:
-  PSNR, SSIM, FLIP   over the facial skin, after one gain per channel
-  features           the distance in EfficientNet-Lite0's features, which is not LPIPS
-  detail             correlation of log green between 1 and 3 px with the truth's
-  shadow step        what is left of the light's step at the true shadow's edge, where it exceeds 0.2 in natural log;
-                     `none` has all of it
---picture shows six photographs of one set, the truth and the rows; only of synthetic people in the documentation.
+true tone, on captures each delighter that needs no pictures, account or checkpoint, and everywhere each that takes
+single photographs. Figures (research/benchmarks/delighting/delight_measures.py) are means over the pictures.
+--picture shows six photographs of one set, the truth and the rows; only synthetic people in the documentation.
 """
 
 import argparse

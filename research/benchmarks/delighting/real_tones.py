@@ -66,13 +66,8 @@ def main() -> None:
                 raise SystemExit(code)
         figures[name] = {options.row: estimate(capture)}
         print(name, *figures[name][options.row].values(), flush=True)
-    write_record(
-        options.json,
-        "real_tones",
-        "python -m research.benchmarks.delighting.real_tones DATA FOLDER",
-        figures,
-        keep=True,
-    )
+    command = "python -m research.benchmarks.delighting.real_tones DATA FOLDER"
+    write_record(options.json, "real_tones", command, figures, keep=True)
 
 
 def cases(data: Path) -> dict[str, Callable[[Path], Path]]:

@@ -3,17 +3,11 @@
 """Compare hair grown from pictures with the known hair of people: where it covers the face, and its direction.
 
     python -m research.benchmarks.head.groomed FOLDER [--seeds 3 ...] [--trust] [--sheet docs/pictures/hair.jpg]
-                                 [--json research/records/groomed.json]
+        [--json research/records/groomed.json]
 
-The people of research/people/lifelike seen by rays from nine sides, lit by one lamp and a sky without shadows, through
-a phone's pipeline; cameras, head and the albedo's texture are the true ones, and the face parser is asked in these
-pictures as the chain asks it, so that nothing but finding hair, its strokes and its growth is judged. Coverage: pixels
-of the frames in which hair covers more than a tenth of a millimetre's surroundings, by the true and by the grown hairs.
-Amount: what both cover of a pixel's surroundings of 3 mm, over what either does: where single hairs lie counts no more.
-Beside both what the true hairs score when they are sown anew, with other roots and the same rule: where pictures show
-no single hairs, no growth can know more. Parser: texels to which it gives more than half, against those where hair
-grows. Direction: each true hair against the nearest grown one within 3 mm, from root to tip, on the skin; beside it
-what the usual directions alone give. FOLDER keeps the pictures.
+The people of research/people/lifelike are seen by rays from nine sides, lit by one lamp and a sky without shadows,
+through a phone's pipeline; cameras, head and the albedo's texture are the true ones, so only the finding of hair, its
+strokes and its growth are judged. docs/results/hair.md explains the figures. FOLDER keeps the pictures.
 """
 
 from pathlib import Path

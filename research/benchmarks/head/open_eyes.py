@@ -75,18 +75,10 @@ def main() -> None:
             continue
         for side, row in zip(SIDES, compare(capture, truth) if capture.eyes.is_file() else missed(truth), strict=False):
             rows[f"{name}, {side}"] = row
-    print(
-        markdown(
-            ["eye", *COLUMNS], [[name, *(number(row[column], 2) for column in COLUMNS)] for name, row in rows.items()]
-        )
-    )
-    write_record(
-        options.json,
-        "open_eyes",
-        "python -m research.benchmarks.head.open_eyes FOLDER --eyes FOLDER",
-        {"rows": rows},
-        keep=True,
-    )
+    lines = [[name, *(number(row[column], 2) for column in COLUMNS)] for name, row in rows.items()]
+    print(markdown(["eye", *COLUMNS], lines))
+    command = "python -m research.benchmarks.head.open_eyes FOLDER --eyes FOLDER"
+    write_record(options.json, "open_eyes", command, {"rows": rows}, keep=True)
 
 
 def compare(capture: Capture, truth: Path) -> list[dict]:

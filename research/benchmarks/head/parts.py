@@ -74,13 +74,8 @@ def main() -> None:
         shares = (*r["iou"].values(), r["hair_as_skin"], r["skin_as_hair"])
         lines.append([name, f"{r['found']} of {r['pictures']}", *(number(v, 2) for v in shares)])
     print(markdown(["person", "found", *PARTS, "hair as skin", "skin as hair"], lines))
-    write_record(
-        options.json,
-        "parts",
-        "python -m research.benchmarks.head.parts" + (" --frames FOLDER" if options.frames else ""),
-        {"rows": rows},
-        keep=True,
-    )
+    command = "python -m research.benchmarks.head.parts" + (" --frames FOLDER" if options.frames else "")
+    write_record(options.json, "parts", command, {"rows": rows}, keep=True)
 
 
 def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:

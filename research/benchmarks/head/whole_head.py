@@ -2,20 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measure the completed head and the hair's masks.
 
-    python -m research.benchmarks.head.whole_head [--seeds 9101 9102 ...] [--json OUT.json] [CAPTURE ...]
+    python -m research.benchmarks.head.whole_head [--seeds 9101 9102 ...] [--subject SEED] [--json OUT] [CAPTURE ...]
 
 Synthetic subjects (truth known everywhere, only the face seen), mean over the seeds, as {"fill", "completed"}; `fill`
-is what the solver gives where nobody looked, its mean face in the subject's tone:
-  neck, ears, scalp   mean error of the hidden albedo's tone (over 2 mm), sRGB of 255
-  grain               deviation of log albedo between 0.5 and 1 mm, hidden neck over face; 1 is alike
-  brows, beard        correlation of the mask with what the painted hair takes from the albedo
-  bare_chin           cm^2 of beard found where there is none
-  below_hair          error of the albedo under brows and beard against the skin painted without hair, sRGB of 255:
-                      {"with hair", "clean"}
-Captures: border, the mean step of the log tone from 8 mm inside the seen part to 6 mm outside, {"fill", "completed",
-"within"}, the last between places as far apart inside; with --subject SEED (the captures are of that synthetic person)
-tone, the errors as above where nobody looked; cut, the step over the map's own cut beside that of neighbours; hair,
-cm^2.
+is the solver's mean face in the subject's tone. neck, ears, scalp: mean error of the hidden tone over 2 mm, sRGB of
+255; grain: deviation of log albedo between 0.5 and 1 mm, hidden neck over face; brows, beard: correlation of the mask
+with what the painted hair takes from the albedo; bare_chin: cm^2 of beard where there is none; below_hair: error of the
+albedo under brows and beard, sRGB of 255. Captures: border, the mean step of the log tone over the seen part's border,
+and between places as far apart inside; cut, the step over the map's own cut beside that of neighbours; hair, cm^2; with
+--subject, their synthetic person, tone, the errors as above where nobody looked.
 """
 
 import json

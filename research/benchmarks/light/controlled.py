@@ -4,19 +4,13 @@
 
     python -m research.benchmarks.light.controlled FOLDER [--only NAME ...] [--json OUT.json]
 
-FOLDER was made by research/benchmarks/captures/people.py (--places wild flash studio) and its wild captures are solved.
-Rows, each an albedo map in the same UVs:
-  wild              the chain's own
-  wild_texture      its texture taken for the albedo
-  flash             dark room, lamp at the camera: the known light divided out (flash_light.py), solved over the same
-                    prior with that light held
-  flash_texture     the same, before the solve
-  limit             the true albedo frames as a texture: what geometry and texture leave
-  studio            sixteen cameras in even light, no delighter, empty mask, solved by the stage
-  studio_texture    its texture taken for the albedo
-All are scored in the wild capture's frames that have a truth; all share head, prior, quality and true skin tone.
-FOLDER/controlled keeps maps and figures, so that a second run goes on where the first stopped. A set that has not been
-made is left out; what OUT.json has and FOLDER has not stays in it.
+FOLDER was made by research/benchmarks/captures/people.py (--places wild flash studio); its wild captures are solved.
+Rows are albedo maps in the same UVs: the wild capture's and its texture; of the dark room with a lamp at the camera,
+the frames over the known light (flash_light.py), as texture and solved with that light held; *limit*, the true albedo
+frames as a texture; of sixteen cameras in even light, without delighter or mask, as texture and solved by the stage.
+All share head, prior, quality and true skin tone, and are scored in the wild capture's frames that have a truth.
+FOLDER/controlled keeps maps and figures, so a second run goes on where the first stopped. Missing sets are left out;
+what OUT.json has and FOLDER has not stays in it.
 """
 
 import json

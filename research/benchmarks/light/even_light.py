@@ -36,18 +36,15 @@ SIDE, SAMPLES = 32, 256
 
 def main() -> int:
     parser = figures.command_line(__doc__, "even_light")
-    arguments = parser.parse_args()
+    options = parser.parse_args()
+    colours = ("red", "green", "blue")
     with extension():
         found = {
-            way: {
-                tone: dict(zip(("red", "green", "blue"), given_back(way, albedo), strict=True))
-                for tone, albedo in TONES.items()
-            }
+            way: {tone: dict(zip(colours, given_back(way, albedo), strict=True)) for tone, albedo in TONES.items()}
             for way in WAYS
         }
-    figures.write_record(
-        arguments.json, "even_light", f"python -m research.benchmarks.light.even_light --json {arguments.json}", found
-    )
+    command = f"python -m research.benchmarks.light.even_light --json {options.json}"
+    figures.write_record(options.json, "even_light", command, found)
     print(table(found))
     return 0
 

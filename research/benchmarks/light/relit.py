@@ -3,23 +3,14 @@
 """Compare solved heads under new light with the true subjects under the same light.
 
     python -m research.benchmarks.light.relit WORK [--sample CAPTURE] [--people FOLDER [--only NAME ...]] [--picture
-    docs/pictures/relit.jpg] [--json OUT.json]
+        docs/pictures/relit.jpg] [--json OUT.json]
 
-CAPTURE was solved from research/people/sample, FOLDER was made by research/benchmarks/captures/people.py. Rendered by
-Cycles with the add-on's own material and lights, of which none lit a capture, as linear EXR; both heads are the
-registered one. A picture is exposed so that the true subject's face has the mean luminance MIDDLE (one gain per light,
-the same for all rows), encoded by the sRGB curve and clipped: no AgX. Figures are of the face, each the mean over the
-lights:
-
-    raw, delit                   the filmed or the delit texture for albedo
-    solved                       all three maps as delivered
-    no_relief, even_gloss        solved without the one, with the other; plain: both
-    true_albedo, true_normal, true_specular    solved, with one map swapped for the true one: what that map costs
-    floor                        the truth with other random numbers: what the rendering's noise costs
-
-The true maps are worn where the registered surface lies on the true head (research/benchmarks/light/relit_maps.py). All
-albedos share the truth's mean over confident facial skin. WORK keeps the renders; those that are newer than the maps
-and textures are taken as they are.
+CAPTURE was solved from research/people/sample, FOLDER was made by research/benchmarks/captures/people.py. Cycles
+renders with the add-on's own material and lights to linear EXR; both heads are the registered one. The exposure gives the true
+subject's face the mean luminance MIDDLE, one gain per light for all rows; then comes the sRGB curve, clipped. Figures
+are of the face, means over the lights. The true maps are worn where the registered surface lies on the true head
+(research/benchmarks/light/relit_maps.py); all albedos share the truth's mean over confident facial skin. WORK keeps the
+renders; those that are newer than the maps and textures are not made again.
 """
 
 import argparse

@@ -200,18 +200,13 @@ def main() -> None:
     parser = command_line(__doc__, "scan_albedo")
     parser.add_argument("capture", type=Path)
     parser.add_argument("truth", type=Path)
-    arguments = parser.parse_args()
-    ours = score_capture(Capture(arguments.capture), arguments.truth)
-    scores = {"WildCap": ours, **score_floors(arguments.truth)}
+    options = parser.parse_args()
+    ours = score_capture(Capture(options.capture), options.truth)
+    scores = {"WildCap": ours, **score_floors(options.truth)}
     print(json.dumps(scores, indent=1))
-    if arguments.json:
-        ours = scores["WildCap"]
-        write_record(
-            arguments.json,
-            "albedo_score",
-            "python -m research.benchmarks.maps.albedo_score CAPTURE TRUTH",
-            {"views": ours["views"], "face_coverage": ours["face_coverage"], "rows": rows(scores)},
-        )
+    found = {"views": ours["views"], "face_coverage": ours["face_coverage"], "rows": rows(scores)}
+    command = "python -m research.benchmarks.maps.albedo_score CAPTURE TRUTH"
+    write_record(options.json, "albedo_score", command, found)
 
 
 if __name__ == "__main__":

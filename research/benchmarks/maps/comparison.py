@@ -2,20 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compare our light with other methods' light models, on delit and raw frames (the paper's protocol).
 
-    python -m research.benchmarks.maps.comparison FOLDER [--only NAME ...] [--scan CAPTURE TRUTH]
-        [--json OUT.json]
+    python -m research.benchmarks.maps.comparison FOLDER [--only NAME ...] [--scan CAPTURE TRUTH] [--json OUT.json]
 
 FOLDER was made and solved by research/benchmarks/captures/people.py; CAPTURE is a solved one of another subject, TRUTH
-its folder. Rows of INPUT: METHOD over one texture:
-  wildcap                  the texel grid of local light in the shadow mask, by two seeds, whose spread is a tie
-  regions 5, regions 10    soft regions with a light each (light_models.py)
-  environment              one environment cubemap
-  environment, no prior    the same, and texels that follow the frames alone, smoothly
-  over its blur            the texture divided by its own blur, what one does by hand in Blender
-  texture                  taken for albedo as it is
-All but the last three sample the same prior with the same guidance; all are told the true skin tone. Raw rows get the
-mask that the chain proposes for raw frames. Maps are kept in FOLDER/comparison (research/benchmarks/maps/rerender.py
-reads them), so that a second run goes on where the first stopped.
+its folder. Rows of INPUT: METHOD over one texture: ours, by two seeds, whose spread is a tie; soft regions with a light
+each, and one environment cubemap, with the prior or with texels that follow the frames alone (light_models.py); the
+texture over its own blur; and the texture as it is. All are given the true skin tone. Raw rows get the mask that the
+chain proposes for raw frames. FOLDER/comparison keeps the maps (research/benchmarks/maps/rerender.py reads them), so a
+second run goes on where the first stopped.
 """
 
 import json

@@ -36,9 +36,9 @@ def main() -> None:
     parser.add_argument("capture", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--truth", type=Path)
-    arguments = parser.parse_args()
-    capture = Capture(arguments.capture.resolve())
-    write_small(arguments.out, sheet(captured(capture) + solved(capture, arguments.truth) + relit(capture)))
+    options = parser.parse_args()
+    capture = Capture(options.capture.resolve())
+    write_small(options.out, sheet(captured(capture) + solved(capture, options.truth) + relit(capture)))
 
 
 def captured(capture: Capture) -> list[np.ndarray]:
