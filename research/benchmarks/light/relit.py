@@ -6,11 +6,11 @@
         docs/pictures/relit.jpg] [--json OUT.json]
 
 CAPTURE was solved from research/people/sample, FOLDER was made by research/benchmarks/captures/people.py. Cycles
-renders with the add-on's own material and lights to linear EXR; both heads are the registered one. The exposure gives the true
-subject's face the mean luminance MIDDLE, one gain per light for all rows; then comes the sRGB curve, clipped. Figures
-are of the face, means over the lights. The true maps are worn where the registered surface lies on the true head
-(research/benchmarks/light/relit_maps.py); all albedos share the truth's mean over confident facial skin. WORK keeps the
-renders; those that are newer than the maps and textures are not made again.
+renders with the add-on's own material and lights to linear EXR; both heads are the registered one. The exposure gives
+the true subject's face the mean luminance MIDDLE, one gain per light for all rows; then comes the sRGB curve, clipped.
+Figures are of the face, means over the lights. The true maps are worn where the registered surface lies on the true
+head (research/benchmarks/light/relit_maps.py); all albedos share the truth's mean over confident facial skin. WORK
+keeps the renders; those that are newer than the maps and textures are not made again.
 """
 
 import argparse
