@@ -1,33 +1,52 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The record that a benchmark leaves behind: {"benchmark", "command", "commit", "date", "machine", "figures"}, one JSON
-file each.
+"""Shape that all benchmarks share: a command line, a record of figures, tables in Markdown.
 
-Benchmarks write it where their --json says; what is published lies in research/records/NAME.json, and the pages of
-docs/results come from there (research/benchmarks/results). Figures are nested dicts of plain numbers; null is one that
-was not measured. Rows of a table are printed in the order in which they were written."""
+A record is {"benchmark", "command", "commit", "date", "machine", "figures"}, one JSON file each, written where --json
+says. The published ones are research/records/NAME.json, from which the pages of docs/results are written
+(research/benchmarks/results). Figures are nested dicts of plain numbers; null was not measured. Tables have their rows
+in the order in which they were written. Standard library only: kills and hostile may start no thread.
+"""
 
 from __future__ import annotations
 
+import argparse
 import datetime
 import json
 import math
+import numbers
 import os
 import subprocess
+import sys
 from pathlib import Path
-
-import numpy as np
 
 from core.capture.files import replacing
 from core.capture.messages import Problem
 
 ROOT = Path(__file__).resolve().parents[2]
 PUBLISHED = ROOT / "research" / "records"
+SAMPLE = ROOT / "research" / "people" / "sample"
+SHARED = ROOT.parent / "shared" / "data"
+"""Data that is no part of this repository."""
 KEYS = {"benchmark", "command", "commit", "date", "machine", "figures"}
 
 
+def command_line(doc: str, record: str = "") -> argparse.ArgumentParser:
+    """Return the parser of a command: its module's docstring is the help; --json goes with a record's name."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    if record:
+        parser.add_argument("--json", type=Path, help=f"write the figures, as to research/records/{record}.json")
+    return parser
+
+
+def run_python(*words: object, quiet: bool = False) -> int:
+    """Return the exit code of `python -m WORDS`, run in the checkout; `quiet` drops its standard output."""
+    command = [sys.executable, "-m", *map(str, words)]
+    return subprocess.call(command, cwd=ROOT, stdout=subprocess.DEVNULL if quiet else None)
+
+
 class Figures(dict):
-    """Nested figures whose keys are attributes, too: `demo.rows.WildCap.psnr`."""
+    """Nested figures whose keys are also attributes: `demo.rows.WildCap.psnr`."""
 
     @classmethod
     def of(cls, figures: dict) -> Figures:
@@ -40,25 +59,31 @@ class Figures(dict):
             raise AttributeError(f"there is no figure {name!r} among {', '.join(self)}") from None
 
 
-def write_record(path: Path, benchmark: str, command: str, figures: dict, keep: bool = False) -> None:
-    """Write a record, with the commit (HEAD's, None outside of git), the day and the machine.
+def write_record(path: Path | None, benchmark: str, command: str, figures: dict, keep: bool = False) -> None:
+    """Write a record with the commit, the day and the machine; without a path do nothing.
 
-    command: as the docs have it, folders as CAPITALS; keep: figures of a record that is there stay where they were
-    not measured anew, as of other captures or rows. Raises ValueError for a figure that is no finite number, string,
-    bool or None. Raises Problem where `keep` finds another file than a record."""
-    path, figures = Path(path), plain(figures)
-    if keep and path.is_file():
-        figures = merged(read_record(path.stem, path.parent)["figures"], figures)
+    command: as the docs have it, folders as CAPITALS; keep: figures of an existing record stay unless measured anew, as
+    of other captures or rows. Raises ValueError for a figure that is no finite number, string, bool or None.
+    """
+    if path is None:
+        return
+    figures = plain(figures)
+    if keep:
+        figures = merged(read_figures(path), figures)
     here = {"commit": commit(), "date": datetime.date.today().isoformat(), "machine": machine_line()}
+    text = layout({"benchmark": benchmark, "command": command, **here, "figures": figures})
     with replacing(path) as temporary:
-        text = layout({"benchmark": benchmark, "command": command, **here, "figures": figures})
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
+def read_figures(path: Path | None) -> dict:
+    """Return the figures of the record at a path, {} if there is none."""
+    return read_record(path.stem, path.parent)["figures"] if path and path.is_file() else {}
+
+
 def read_record(name: str, folder: Path = PUBLISHED) -> dict:
-    """Return the record `name` of a folder; "date" and "machine" are None in older ones. Raises Problem where it is
-    missing or is no record."""
-    path = Path(folder) / f"{name}.json"
+    """Return a record of a folder; "date" and "machine" are None in older ones. Raises Problem if it is none."""
+    path = folder / f"{name}.json"
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
     except OSError:
@@ -76,7 +101,7 @@ def read_record(name: str, folder: Path = PUBLISHED) -> dict:
 
 
 def layout(record: dict, indent: int = 0) -> str:
-    """JSON text with one line for each row of figures, that is for each dict that holds no other."""
+    """Return JSON text with one line for each row of figures, that is for each dict that holds no other."""
     if not any(isinstance(value, dict) for value in record.values()):
         return json.dumps(record, ensure_ascii=False)
     space = " " * (indent + 1)
@@ -97,59 +122,44 @@ def markdown(head: list[str], rows: list[list]) -> str:
 
 
 def number(value: float | None, digits: int, unit: str = "") -> str | None:
-    """Return what a table's cell says of a figure; None, which is a dash there, of one that was not measured."""
+    """Return the text of a figure in a table; None, which is a dash there, if it was not measured."""
     return None if value is None else f"{value:.{digits}f}{unit}"
 
 
 def merged(base: dict, update: dict) -> dict:
-    """Nested figures: `update` over `base`."""
-    return {
-        **base,
-        **{
-            key: merged(base[key], value) if isinstance(value, dict) and isinstance(base.get(key), dict) else value
-            for key, value in update.items()
-        },
-    }
+    """Return nested figures: `update` over `base`."""
+    both = {key: merged(base[key], value) for key, value in update.items() if isinstance(value, dict) and key in base}
+    return {**base, **update, **both}
 
 
 def plain(figures, name: str = "figures"):
-    """The same with NumPy's numbers as Python's, rounded to six decimals. Raises ValueError that names the figure JSON
-    cannot hold."""
+    """Return figures as Python's numbers, rounded to six decimals; ValueError names what JSON cannot hold."""
     if isinstance(figures, dict):
         return {str(key): plain(value, f"{name}.{key}") for key, value in figures.items()}
-    if isinstance(figures, np.generic):
-        figures = figures.item()
-    if figures is None or isinstance(figures, str | bool | int):
+    if figures is None or isinstance(figures, str | bool):
         return figures
-    if isinstance(figures, float) and math.isfinite(figures):
-        return round(figures, 6)
+    if isinstance(figures, numbers.Integral):
+        return int(figures)
+    if isinstance(figures, numbers.Real) and math.isfinite(figures):
+        return round(float(figures), 6)
     raise ValueError(f"{name} is {figures!r}: a figure is a finite number, a string, or None where it was not measured")
 
 
 def commit() -> str | None:
-    """HEAD's short hash; None where this is no checkout or git is not installed."""
+    """Return HEAD's short hash, None outside of git."""
+    command = ["git", "rev-parse", "--short", "HEAD"]
     try:
-        found = subprocess.run(
-            ["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True
-        )
+        return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
     except (OSError, subprocess.CalledProcessError):
         return None
-    return found.stdout.strip()
-
-
-def machine() -> dict:
-    """Return the processor's name, its cores, and the memory in GB; None where the system does not say it."""
-    try:
-        told = Path("/proc/cpuinfo").read_text(encoding="utf-8")
-        name = next(line.partition(":")[2].strip() for line in told.splitlines() if line.startswith("model name"))
-        memory = round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9)
-    except (OSError, StopIteration):
-        name = memory = None
-    return {"processor": name, "cores": os.cpu_count(), "memory_gb": memory}
 
 
 def machine_line() -> str:
-    """Return the same in words."""
-    here = machine()
-    memory = f", {here['memory_gb']} GB" if here["memory_gb"] else ""
-    return f"{here['cores']} cores ({here['processor'] or 'unknown processor'}){memory}"
+    """Return the cores, the processor's name and the memory, as far as the system tells them."""
+    try:
+        about = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        name = next(line.partition(":")[2].strip() for line in about if line.startswith("model name"))
+        memory = f", {round(os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 1e9)} GB"
+    except (OSError, StopIteration):
+        name, memory = "unknown processor", ""
+    return f"{os.cpu_count()} cores ({name}){memory}"

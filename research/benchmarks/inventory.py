@@ -1,15 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The inventory of every name that is persisted or addressed from outside: what saved captures, .blend files, batches,
-scripts and render farms rely on.
+"""Take the inventory of names that captures, .blend files, batches, scripts and render farms rely on.
 
     python -m research.benchmarks.inventory [--out tests/inventory.json]
 
 tests/test_inventory.py compares the code with the recorded one, so a name changes only on purpose. All of it is read
 from the sources; Blender is not needed.
 """
-
-from __future__ import annotations
 
 import argparse
 import ast
@@ -19,13 +16,13 @@ import tempfile
 import tomllib
 from pathlib import Path
 
-from core import __main__ as command_line
+from core import __main__ as program
 from core.batch.shots import HEADINGS
 from core.capture import capture_record, stages
 from core.capture.files import write_json
 from core.settings import delivery_presets, settings
 
-from .figures import ROOT
+from .figures import ROOT, command_line
 
 RECORD = ROOT / "tests" / "inventory.json"
 SAVED_NAME = re.compile(r"wildcap_[a-z0-9_]+|WildCap [A-Z][A-Za-z ]*")
@@ -33,13 +30,13 @@ SAVED_NAME = re.compile(r"wildcap_[a-z0-9_]+|WildCap [A-Z][A-Za-z ]*")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = command_line(__doc__)
     parser.add_argument("--out", type=Path, default=RECORD)
     write_json(parser.parse_args().out, take_inventory())
 
 
 def take_inventory() -> dict:
-    """Return every name, by what it is a name of; lists are in order of name where their order means nothing."""
+    """Return every name, by what it is a name of; lists are sorted where their order means nothing."""
     addon = [ast.parse(path.read_text(encoding="utf-8")) for path in sorted((ROOT / "wildcap_addon").rglob("*.py"))]
     return {
         "stages": {stage.name: [*stage.reads, "->", *stage.writes] for stage in stages.STAGES},
@@ -50,7 +47,7 @@ def take_inventory() -> dict:
         "batch_table": list(HEADINGS),
         "capture_record": sorted(capture_record.ENTRY),
         "figures": _figures(),
-        "command_line": _commands(command_line._parser()),
+        "command_line": _commands(program._parser()),
         "classes": _classes(addon),
         "saved_names": sorted({name for tree in addon for name in _saved_names(tree)}),
         "zip": _zip_files(),
@@ -64,7 +61,7 @@ def _describe(field) -> str:
 
 
 def _figures() -> list[str]:
-    """Return the names that stages and tools leave in capture.json, where they are written as text."""
+    """Return the names of the figures that stages and tools write, where they are literals."""
     calls = (
         node
         for path in (ROOT / "core").rglob("*.py")
@@ -77,7 +74,7 @@ def _figures() -> list[str]:
 
 
 def _commands(parser: argparse.ArgumentParser, name: str = "core") -> dict[str, list[str]]:
-    """Command -> its options and positional arguments."""
+    """Return command -> its options and positional arguments."""
     found = {name: []}
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
@@ -89,7 +86,7 @@ def _commands(parser: argparse.ArgumentParser, name: str = "core") -> dict[str, 
 
 
 def _classes(trees: list[ast.Module]) -> dict[str, list[str]]:
-    """Blender class -> its identifier, if it gives one, and its properties."""
+    """Return Blender class -> its identifier, if it gives one, and its properties."""
     found = {}
     for node in (node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ClassDef)):
         if not re.match("WILDCAP_[A-Z]{2}_", node.name):
@@ -128,8 +125,8 @@ def _zip_files() -> list[str]:
 
 def _listed(*options: str) -> set[str]:
     command = ["git", "ls-files", "-z", *options]
-    told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    return set(filter(None, told.split("\0")))
+    output = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    return set(filter(None, output.split("\0")))
 
 
 if __name__ == "__main__":

@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which wheels a platform and a Python need: the direct requirements and all that they need in turn, as the package
-index has them.
+"""Resolve the wheels that a platform and a Python need, by the package index.
 
 pip chooses among versions and wheels. It judges the conditions of a requirement ("only on Windows") for the Python that
 it runs in, so it is asked without dependencies, and the conditions are judged here.
 """
-
-from __future__ import annotations
 
 import json
 import re
@@ -42,13 +39,12 @@ class Wheel:
 
 
 def resolve(name: str, direct: list[str], cuda: bool = False) -> dict[str, Wheel]:
-    """Package -> wheel for the lock `name`, with PyTorch's CUDA libraries or without. Raises Problem where a package is
-    not to be had."""
+    """Return package -> wheel for the lock `name`, with or without CUDA libraries. Raises Problem if one is missing."""
     environment, extras = environment_of(name), {}
-    wanted = {locks.normal(Requirement(text).name): {text} for text in direct}
+    requirements = {locks.normal(Requirement(text).name): {text} for text in direct}
     while True:
-        found = ask(name, sorted(text for texts in wanted.values() for text in texts))
-        before = sum(map(len, wanted.values()))
+        found = ask(name, sorted(text for texts in requirements.values() for text in texts))
+        before = sum(map(len, requirements.values()))
         for wheel in found.values():
             for need in map(Requirement, wheel.needs):
                 with_extras = [{**environment, "extra": extra} for extra in ("", *extras.get(wheel.name, ()))]
@@ -59,40 +55,24 @@ def resolve(name: str, direct: list[str], cuda: bool = False) -> dict[str, Wheel
                     and not cuda
                 ):
                     continue
-                wanted.setdefault(locks.normal(need.name), set()).add(f"{need.name}{need.specifier}")
+                requirements.setdefault(locks.normal(need.name), set()).add(f"{need.name}{need.specifier}")
                 extras.setdefault(locks.normal(need.name), set()).update(need.extras)
-        if sum(map(len, wanted.values())) == before:
+        if sum(map(len, requirements.values())) == before:
             return found
 
 
 def is_cuda(wheel: Wheel, need: Requirement) -> bool:
-    """PyTorch asks for CUDA's libraries by the condition platform_system == "Linux" alone."""
+    """Return True for PyTorch's CUDA libraries, whose condition is platform_system == "Linux" alone."""
     return wheel.name == "torch" and need.marker is not None and '"Linux"' in str(need.marker)
 
 
 def ask(name: str, packages: list[str], *more: str) -> dict[str, Wheel]:
-    """Return the wheels that pip chooses for a lock's platform and Python, without what they need in turn. Raises
-    Problem where one is not to be had."""
+    """Return the wheels that pip chooses for a lock, without dependencies. Raises Problem if one is missing."""
     with tempfile.TemporaryDirectory(prefix="wildcap_lock_") as folder:
         report = Path(folder) / "report.json"
-        command = [
-            sys.executable,
-            "-m",
-            "pip",
-            "install",
-            "--disable-pip-version-check",
-            "--quiet",
-            "--dry-run",
-            "--ignore-installed",
-            "--no-deps",
-            "--target",
-            folder,
-            "--report",
-            report,
-            *wheels.tags(name),
-            *more,
-            *packages,
-        ]
+        words = "-m pip install --disable-pip-version-check --quiet --dry-run --ignore-installed --no-deps".split()
+        places = ("--target", folder, "--report", report)
+        command = [sys.executable, *words, *places, *wheels.tags(name), *more, *packages]
         ended = subprocess.run([str(word) for word in command], capture_output=True, text=True)
         if ended.returncode:
             errors = [line for line in ended.stderr.splitlines() if line.startswith("ERROR")]
@@ -100,22 +80,17 @@ def ask(name: str, packages: list[str], *more: str) -> dict[str, Wheel]:
                 f"{name}: {' '.join(errors) or ended.stderr[-300:]}",
                 "Choose versions that have wheels for it in requirements/worker.txt.",
             )
-        chosen = {}
-        for entry in json.loads(report.read_text(encoding="utf-8"))["install"]:
-            about, source = entry["metadata"], entry["download_info"]
-            wheel = Wheel(
-                locks.normal(about["name"]),
-                about["version"],
-                source["url"],
-                source.get("archive_info", {}).get("hashes", {}).get("sha256", ""),
-                tuple(about.get("requires_dist", ())),
-            )
-            chosen[wheel.name] = wheel
+        entries = json.loads(report.read_text(encoding="utf-8"))["install"]
+    chosen = {}
+    for about, source in ((entry["metadata"], entry["download_info"]) for entry in entries):
+        sha256 = source.get("archive_info", {}).get("hashes", {}).get("sha256", "")
+        package, needs = locks.normal(about["name"]), tuple(about.get("requires_dist", ()))
+        chosen[package] = Wheel(package, about["version"], source["url"], sha256, needs)
     return chosen
 
 
 def environment_of(name: str) -> dict[str, str]:
-    """Return what a requirement's conditions are judged by (PEP 508)."""
+    """Return the environment that a requirement's conditions are judged by (PEP 508)."""
     platform, _, python = name.rpartition("-")
     system, short, machine, kind = {
         "win_amd64": ("Windows", "win32", "AMD64", "nt"),
@@ -129,9 +104,9 @@ def environment_of(name: str) -> dict[str, str]:
         "os_name": kind,
         "python_version": python,
         "python_full_version": f"{python}.0",
+        "implementation_version": f"{python}.0",
         "implementation_name": "cpython",
         "platform_python_implementation": "CPython",
-        "implementation_version": f"{python}.0",
         "platform_release": "",
         "platform_version": "",
         "extra": "",
@@ -139,8 +114,10 @@ def environment_of(name: str) -> dict[str, str]:
 
 
 def wheel_files(url: str) -> tuple[int, list[tuple[str, int]]]:
-    """Bytes to download of a wheel at an address, and its files with their bytes unpacked: a wheel's own directory, at
-    its end, says them. Raises Problem when it is not there, or the server gives no parts of it."""
+    """Return the bytes to download of a wheel, and its files with their bytes unpacked, from its own directory.
+
+    Raises Problem if the server does not answer, or gives no parts of a file.
+    """
     try:
         tail, total = _part(url, -END.size)
         *_, size, offset, _ = END.unpack(tail)
@@ -153,7 +130,7 @@ def wheel_files(url: str) -> tuple[int, list[tuple[str, int]]]:
 
 
 def _part(url: str, offset: int, size: int | None = None) -> tuple[bytes, int]:
-    """`size` bytes of a file from `offset` (the last ones where it is negative), and the whole file's size."""
+    """Return `size` bytes of a file from `offset` (negative: the last ones), and the whole file's size."""
     parts = urllib.parse.urlsplit(url)
     if parts.scheme == "file":
         path = Path(urllib.request.url2pathname(parts.path))
@@ -161,8 +138,8 @@ def _part(url: str, offset: int, size: int | None = None) -> tuple[bytes, int]:
         with open(path, "rb") as file:
             file.seek(offset % total)
             return file.read() if size is None else file.read(size), total
-    wanted = f"bytes={offset}" if offset < 0 else f"bytes={offset}-{'' if size is None else offset + size - 1}"
-    with urllib.request.urlopen(urllib.request.Request(url, headers={"Range": wanted}), timeout=30) as answer:
+    range_header = f"bytes={offset}" if offset < 0 else f"bytes={offset}-{'' if size is None else offset + size - 1}"
+    with urllib.request.urlopen(urllib.request.Request(url, headers={"Range": range_header}), timeout=30) as answer:
         found = re.fullmatch(r"bytes \d+-\d+/(\d+)", answer.headers.get("Content-Range", ""))
         if found is None:
             raise ValueError("it gives no parts of a file")
@@ -170,7 +147,7 @@ def _part(url: str, offset: int, size: int | None = None) -> tuple[bytes, int]:
 
 
 def _listed(directory: bytes) -> list[tuple[str, int]]:
-    """Name and bytes unpacked of the files in a zip file's central directory (PKWARE APPNOTE 4.3.12)."""
+    """Return name and bytes unpacked of the files in a zip's central directory (PKWARE APPNOTE 4.3.12)."""
     files, at = [], 0
     while directory[at : at + 4] == b"PK\1\2":
         size, name_length, *more = struct.unpack_from("<L3H", directory, at + 24)

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Write requirements/locks: every package of the solver for each platform and Python, pinned, with the hash of its
-wheel, its bytes to download and its bytes on disk.
+"""Write requirements/locks: the solver's packages for each platform and Python, pinned, with hashes and sizes.
 
     python -m research.benchmarks.locks [NAME ...]      NAME as win_amd64-3.13; all of them without one
     python -m research.benchmarks.locks --table         packages, bytes to download and longest path of each, as the
@@ -13,9 +12,6 @@ alone and say "not verified". PyTorch's build for Linux on the index needs CUDA'
 the lock; where pip finds a build for the CPU as well (in a folder of wheels), the lock has the hashes of both.
 """
 
-from __future__ import annotations
-
-import argparse
 import sys
 from pathlib import Path, PurePosixPath
 
@@ -24,6 +20,7 @@ from core.capture.messages import Problem
 from core.worker import index, locks, pip_steps
 
 from . import lock_resolver
+from .figures import command_line
 from .lock_resolver import Wheel
 
 REQUIREMENTS = Path(__file__).resolve().parents[2] / "requirements"
@@ -34,7 +31,7 @@ NOT_VERIFIED = (
 )
 PIP = "26.3"
 TEMPORARY = ".0123456789012345"
-"""What Python appends to a compiled file's name while it writes it: a dot and a number of 15 digits or so."""
+"""Suffix that Python appends to a compiled file's name while it writes it: a dot and a number of 15 digits or so."""
 COMPILED = 1.25
 """Bytes of compiled Python for each of source, which pip adds (PyTorch's and SciPy's: 1.20 and 1.38)."""
 
@@ -60,8 +57,7 @@ def write(name: str) -> None:
 
 
 def _packages(name: str, wheels: dict[str, Wheel], torch: str = "") -> list[str]:
-    """Return the longest path of all, then the packages, with their sizes; `torch` is the hash of a build of PyTorch
-    that is taken as well."""
+    """Return the longest path of all, then the packages with their sizes; `torch` is the hash of a further build."""
     files = {other: lock_resolver.wheel_files(wheel.url) for other, wheel in wheels.items()}
     longest = max(
         (path for _, listed in files.values() for file, _ in listed for path in installed_paths(file, name)), key=len
@@ -74,7 +70,7 @@ def _packages(name: str, wheels: dict[str, Wheel], torch: str = "") -> list[str]
 
 
 def sizes(download: int, files: list[tuple[str, int]]) -> tuple[int, int]:
-    """Bytes to download and bytes on disk of a wheel's files, those among them that pip compiles."""
+    """Return the bytes to download and on disk of a wheel's files, with those that pip compiles."""
     return download, round(sum(size * (1 + COMPILED * file.endswith(".py")) for file, size in files))
 
 
@@ -98,8 +94,7 @@ def _write_pip(name: str) -> None:
 
 
 def installed_paths(file: str, name: str) -> list[str]:
-    """Return where a file of a wheel comes to lie below the environment's folder, the compiled one of a module and its
-    temporary name among them."""
+    """Return the paths of a wheel's file below the environment's folder, with its compiled and temporary ones."""
     platform, _, python = name.rpartition("-")
     inside, scripts = (
         ("Lib/site-packages", "Scripts") if platform == "win_amd64" else (f"lib/python{python}/site-packages", "bin")
@@ -114,7 +109,7 @@ def installed_paths(file: str, name: str) -> list[str]:
 
 
 def _write_build(name: str, compute: str, version: str, local: Wheel, wheels: dict[str, Wheel]) -> None:
-    """The file of one of PyTorch's own builds, or of what the index's needs besides, beside a lock."""
+    """Write the file of one of PyTorch's own builds, or of the CUDA libraries, beside a lock."""
     system = {"win_amd64": "win32", "macosx_arm64": "darwin"}.get(name.rpartition("-")[0], "linux")
     build = pip_steps.BUILDS.get((system, compute), "")
     if build:
@@ -142,13 +137,14 @@ def _own_build(name: str, version: str, build: str, local: Wheel, compute: str) 
 
 
 def _linux_size(name: str, compute: str) -> tuple[int, int]:
-    """Return the size of the index's build for Linux, with CUDA's libraries where it is for CUDA: other systems' builds
-    have them within."""
+    """Return the size of the index's build for Linux; other systems' CUDA builds hold the libraries."""
     linux = f"manylinux_x86_64-{name.rpartition('-')[2]}"
-    known = [size for pinned, size in locks.read(REQUIREMENTS, linux).sizes.items() if pinned.startswith("torch==")]
+    sizes_of_parts = [
+        size for pinned, size in locks.read(REQUIREMENTS, linux).sizes.items() if pinned.startswith("torch==")
+    ]
     if compute == "cuda":
-        known += locks.read(REQUIREMENTS, f"{linux}-cuda").sizes.values()
-    return tuple(map(sum, zip(*known, strict=True)))
+        sizes_of_parts += locks.read(REQUIREMENTS, f"{linux}-cuda").sizes.values()
+    return tuple(map(sum, zip(*sizes_of_parts, strict=True)))
 
 
 def _write(name: str, lines: list[str]) -> None:
@@ -157,7 +153,7 @@ def _write(name: str, lines: list[str]) -> None:
 
 
 def table() -> str:
-    """One line per lock, as the locks themselves say."""
+    """Return a line per lock, from the locks themselves."""
     rows = ["| lock | packages | to download | longest path below the folder |", "| --- | --- | --- | --- |"]
     for lock in (locks.read(REQUIREMENTS, name) for name in locks.names()):
         download = index.gigabytes(sum(size for size, _ in lock.sizes.values()))
@@ -166,7 +162,7 @@ def table() -> str:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = command_line(__doc__)
     parser.add_argument("names", metavar="NAME", nargs="*")
     parser.add_argument("--table", action="store_true")
     options = parser.parse_args()

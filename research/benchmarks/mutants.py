@@ -1,21 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How many small faults, put into the product one at a time, its tests find.
+"""Put small faults into the product, one at a time, and count those that its tests find.
 
     python -m research.benchmarks.mutants draw  --out tests/mutants.json [--count 60] [--seed 1]
     python -m research.benchmarks.mutants trace --record tests/mutants.json
     python -m research.benchmarks.mutants run   --record tests/mutants.json [--limit 60]
 
 `draw` picks faults at random: an operator, a comparison, a condition or a number in a function of the product. `trace`
-runs the whole suite once over a copy in which those functions note the tests that enter them. `run` puts in one fault
-after another and runs the tests that enter its function, nearest first, until one fails; that one is recorded. A fault
-is named by its file, function, kind and position; "code" is the expression it changes, by which a function that was
-rewritten is searched by hand, and "killed_before" the test that found it at commit e5e14778.
+runs the suite once over a copy in which those functions note the tests that enter them. `run` puts in one fault after
+another and runs the tests that enter its function, nearest first, until one fails; that one is recorded. A fault is
+named by its file, function, kind and position; "code" is the expression it changes, by which a rewritten function is
+searched by hand, and "killed_before" the test that found it at commit e5e14778.
 """
 
-from __future__ import annotations
-
-import argparse
 import ast
 import json
 import os
@@ -24,32 +21,26 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from core.capture.files import write_json
 
-from .figures import ROOT
+from .figures import ROOT, command_line
 
+PYTEST = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider")
 PRODUCT = ("core", "wildcap_addon")
-SWAPS = {
-    ast.Lt: ast.GtE,
-    ast.LtE: ast.Gt,
-    ast.Gt: ast.LtE,
-    ast.GtE: ast.Lt,
-    ast.Eq: ast.NotEq,
-    ast.NotEq: ast.Eq,
-    ast.Is: ast.IsNot,
-    ast.IsNot: ast.Is,
-    ast.In: ast.NotIn,
-    ast.NotIn: ast.In,
-    ast.Add: ast.Sub,
-    ast.Sub: ast.Add,
-    ast.Mult: ast.Div,
-    ast.Div: ast.Mult,
-    ast.And: ast.Or,
-    ast.Or: ast.And,
-}
+PAIRS = (
+    (ast.Lt, ast.GtE),
+    (ast.LtE, ast.Gt),
+    (ast.Eq, ast.NotEq),
+    (ast.Is, ast.IsNot),
+    (ast.In, ast.NotIn),
+    (ast.Add, ast.Sub),
+    (ast.Mult, ast.Div),
+    (ast.And, ast.Or),
+)
+SWAPS = {**dict(PAIRS), **{other: one for one, other in PAIRS}}
 HITS = "WILDCAP_MUTANT_HITS"
 """Variable that names the file in which functions note the tests that enter them."""
 NOTE = f"""
@@ -64,7 +55,7 @@ def _note_hit(number, noted=set()):
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("step", choices=("draw", "trace", "run"))
     parser.add_argument("--record", "--out", type=Path, required=True)
     parser.add_argument("--count", type=int, default=60)
@@ -163,7 +154,7 @@ def copy_tree(to: Path) -> None:
 
 
 def trace(mutants: list[dict], tree: Path) -> None:
-    """Has each fault know the tests that enter its function ("entered_by")."""
+    """Record the tests that enter each fault's function ("entered_by")."""
     by_file: dict[str, list[tuple[int, str]]] = {}
     for number, mutant in enumerate(mutants):
         by_file.setdefault(mutant["file"], []).append((number, mutant["function"]))
@@ -171,37 +162,30 @@ def trace(mutants: list[dict], tree: Path) -> None:
         parsed = ast.parse((tree / file).read_text(encoding="utf-8"))
         nodes = dict(functions_of(parsed))
         for number, name in functions:
-            if name not in nodes:
+            if name in nodes:
+                nodes[name].body.insert(0, ast.parse(f"_note_hit({number})").body[0])
+            else:
                 print(f"{file} has no {name} any more.")
-                continue
-            body = nodes[name].body
-            after_docstring = int(isinstance(body[0], ast.Expr) and isinstance(body[0].value, ast.Constant))
-            body.insert(after_docstring, ast.parse(f"_note_hit({number})").body[0])
-        last_future = max([i for i, node in enumerate(parsed.body) if _opens_a_file(node)], default=-1)
-        parsed.body[last_future + 1 : last_future + 1] = ast.parse(NOTE).body
+        # a docstring and imports from __future__ stay first
+        first = next(i for i, node in enumerate(parsed.body) if not _opens_a_file(node))
+        parsed.body[first:first] = ast.parse(NOTE).body
         (tree / file).write_text(ast.unparse(ast.fix_missing_locations(parsed)), encoding="utf-8")
     hits = tree.parent / "hits.txt"
-    command = [*_pytest(), "tests", "--ignore=tests/gui", "-n", "2", "--dist", "loadfile"]
+    command = [*PYTEST, "tests", "--ignore=tests/gui", "-n", "2", "--dist", "loadfile"]
     subprocess.run(command, cwd=tree, env={**os.environ, HITS: str(hits)})
-    entered: dict[int, set[str]] = {}
-    for line in hits.read_text(encoding="utf-8").splitlines():
-        number, _, test = line.partition("\t")
-        entered.setdefault(int(number), set()).add(test)
+    pairs = {tuple(line.split("\t")) for line in hits.read_text(encoding="utf-8").splitlines()}
     for number, mutant in enumerate(mutants):
-        mutant["entered_by"] = sorted(entered.get(number, ()))
+        mutant["entered_by"] = sorted(test for index, test in pairs if index == str(number))
 
 
 def _opens_a_file(node: ast.stmt) -> bool:
-    """Return whether it has to stay before all else: the module's docstring, or an import from __future__."""
     docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
     return docstring or (isinstance(node, ast.ImportFrom) and node.module == "__future__")
 
 
-def run(mutants: list[dict], tree: Path, limit: int, keep) -> None:
-    """Has each fault know the test that finds it ("killed_by", None where none does)."""
-    for mutant in mutants:
-        if "killed_by" in mutant:
-            continue
+def run(mutants: list[dict], tree: Path, limit: int, keep: Callable[[], None]) -> None:
+    """Record the test that finds each fault ("killed_by", None if none does)."""
+    for mutant in (mutant for mutant in mutants if "killed_by" not in mutant):
         path = tree / mutant["file"]
         sound = path.read_text(encoding="utf-8")
         path.write_text(put_fault(sound, mutant), encoding="utf-8")
@@ -222,13 +206,8 @@ def _nearest(mutant: dict) -> list[str]:
 def _first_failure(tree: Path, tests: list[str]) -> str | None:
     if not tests:
         return None
-    ended = subprocess.run([*_pytest(), "-x", *tests], cwd=tree, capture_output=True, text=True, timeout=1200)
-    failed = [line.split()[1] for line in ended.stdout.splitlines() if line.startswith(("FAILED ", "ERROR "))]
-    return failed[0] if failed else None
-
-
-def _pytest() -> list[str]:
-    return [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+    ended = subprocess.run([*PYTEST, "-x", *tests], cwd=tree, capture_output=True, text=True, timeout=1200)
+    return next((line.split()[1] for line in ended.stdout.splitlines() if line.startswith(("FAILED ", "ERROR "))), None)
 
 
 if __name__ == "__main__":

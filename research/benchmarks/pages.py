@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A page of docs/results: title, then command, commit, day and machine of each record that it shows, then sections.
+"""A page of docs/results: title, then the origin of each record that it shows, then sections.
 
-A benchmark may write its page when it has run (`write_page`); `python -m research.benchmarks.results` writes all of
-them out of the records, which hold six decimals: a last digit may differ."""
+`python -m research.benchmarks.results` writes all of them from the records.
+"""
 
-from __future__ import annotations
-
-import datetime
 import inspect
 import re
 import textwrap
@@ -15,19 +12,10 @@ from pathlib import Path
 
 from core.capture.files import replacing
 
-from .figures import commit, machine_line
-
 MADE = "<!-- Written out of research/records by `make results`: edit the words in research/benchmarks/, not here. -->"
 WIDTH = 120
 Sections = list[tuple[str, str]]
 """Headings ("" for none), and below each its Markdown."""
-
-
-def write_page(path: Path, title: str, command: str, sections: Sections) -> None:
-    """Write the page of a benchmark that has just run."""
-    today = datetime.date.today().isoformat()
-    made = {"command": command, "commit": commit(), "date": today, "machine": machine_line()}
-    replace_text(path, page_text(title, [made], sections))
 
 
 def page_text(title: str, records: list[dict], sections: Sections) -> str:
@@ -39,17 +27,17 @@ def page_text(title: str, records: list[dict], sections: Sections) -> str:
 
 
 def made_by(records: list[dict]) -> str:
-    """Command, commit, day and machine of each record; what a record does not know is left out."""
+    """Return command, commit, day and machine of each record, as far as it has them."""
     lines = []
     for record in records:
         machine = f"on {record['machine']}" if record.get("machine") else None
-        known = filter(None, [f"commit {record['commit'] or 'unknown'}", record.get("date"), machine])
-        lines.append(f"`{record['command']}`, {', '.join(known)}.")
+        parts = filter(None, [f"commit {record['commit'] or 'unknown'}", record.get("date"), machine])
+        lines.append(f"`{record['command']}`, {', '.join(parts)}.")
     return f"Made by {lines[0]}" if len(lines) == 1 else "Made by\n\n" + "\n".join(f"- {line}" for line in lines)
 
 
 def prose(*paragraphs: str) -> str:
-    """Paragraphs, tables and pictures with a blank line between them, without the source's indentation."""
+    """Join paragraphs, tables and pictures with a blank line, without the source's indentation."""
     return "\n\n".join(inspect.cleandoc(part) for part in paragraphs)
 
 

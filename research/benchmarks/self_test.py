@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Self-Test expects, after the sample head, the prior or the solver has changed.
+"""Measure the score that Self-Test expects, after the sample head, the prior or the solver has changed.
 
     python -m research.benchmarks.self_test [COUNT]
 
@@ -8,9 +8,6 @@ Another device draws other noise and rounds otherwise, so what is expected is me
 float32.
 """
 
-from __future__ import annotations
-
-import argparse
 import tempfile
 from pathlib import Path
 from unittest import mock
@@ -25,12 +22,14 @@ from core.stages.solve.self_test import EXPECTED_FILE, measure
 from core.worker import self_test
 from core.worker.job import read_job
 
+from .figures import command_line
+
 SEEDS = 4
 PRECISIONS = {"bfloat16": torch.bfloat16, "float32": torch.float32}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("count", type=int, nargs="?", default=SEEDS, help="of seeds")
     count = parser.parse_args().count
     scores = {name: [score(seed, dtype) for seed in range(1, 1 + count)] for name, dtype in PRECISIONS.items()}

@@ -31,19 +31,6 @@ def test_a_problem_is_its_albedo_under_light_and_shadow():
     assert left(raw) < 0.8 and left(raw) + 0.05 < left(delit) < 1
 
 
-def test_the_tone_that_was_asked_for_is_delivered_and_without_that_step_it_is_not():
-    given = uv_problems.make_problem("9002", "edge, half soft", 128)
-    delivered, sampled = ablation.tone_error(given, (0.47, 0.31, 0.23), 2)
-    assert delivered < 1 < sampled
-
-
-def test_a_plain_problem_repeats_and_masks_its_shadow():
-    given, again = (uv_problems.make_plain_problem(3, "leaves", 64) for _ in range(2))
-    assert np.array_equal(given.texture, again.texture) and given.texture.min() >= 0
-    shadow = given.regions()["shadow"]
-    assert shadow.any() and (given.mask[shadow] == 1).all() and 0 < given.mask[given.face].mean() < 1
-
-
 def test_light_that_sh_cannot_explain_is_a_tenth():
     p, size = (1, 2, 3), 64
     shading, _, _ = uv_problems._light("edge, half soft", p, size)

@@ -16,7 +16,6 @@ from core.geometry import meshes, raster
 from core.geometry.views import read_views  # noqa: E402
 from core.imaging import images  # noqa: E402
 from research.benchmarks.light import (
-    controlled,
     flash_light,  # noqa: E402
 )
 from tests.fixtures import photographed_head  # noqa: E402
@@ -96,51 +95,3 @@ def test_without_a_highlight_none_is_found(dark_room):
         frames.append(flash_light.lit(view, albedo * frame.shading[..., None], head))
     found = flash_light.highlight(frames, head.unfold(64))
     assert np.median(found.strength[24:40, 24:40]) < 0.1 * F0
-
-
-def test_people_of_a_record_stay_where_others_are_measured(tmp_path, monkeypatch, capsys):
-    def row(psnr):
-        return {
-            "psnr": psnr,
-            "psnr_after_gain": psnr,
-            "ssim_after_gain": 0.9,
-            "flip_after_gain": 0.1,
-            "detail": 0.8,
-            "mole_contrast": None,
-        }
-
-    def rows(psnr):
-        return {
-            name: row(psnr + i) for i, name in enumerate(("wild_texture", "wild", "flash_texture", "flash", "limit"))
-        }
-
-    def run(name, psnr):
-        monkeypatch.setattr(controlled, "measure", lambda folder, person: rows(psnr))
-        monkeypatch.setattr(
-            "sys.argv", ["controlled", str(tmp_path), "--only", name, "--json", str(tmp_path / "out.json")]
-        )
-        assert controlled.main() == 0
-        return json.loads((tmp_path / "out.json").read_text())["figures"]
-
-    run("tan", 30.0)
-    found = run("light", 32.0)
-    assert list(found["people"]) == ["light", "tan"] and found["people"]["tan"]["wild"]["psnr"] == 31.0
-    assert found["mean"]["flash"]["psnr_after_gain"] == 34.0 and "mean of 2 people" in capsys.readouterr().out
-    assert run("tan", 40.0)["mean"]["flash"]["psnr_after_gain"] == 39.0
-    monkeypatch.setattr(controlled, "measure", lambda folder, person: {"wild": row(50.0)})
-    controlled.main()
-    people = json.loads((tmp_path / "out.json").read_text())["figures"]["people"]
-    assert people["tan"]["wild"]["psnr"] == 50.0 and people["tan"]["flash"]["psnr"] == 43.0, (
-        "a set that was not made again keeps its figures"
-    )
-
-
-def test_what_was_measured_before_is_read_and_not_measured_again(tmp_path):
-    """A person whose limit alone is kept: nothing is solved, and of the other places nothing is there."""
-    (tmp_path / "dark").mkdir()
-    (tmp_path / "dark" / "skin_tone.txt").write_text("0.3,0.2,0.15")
-    kept = tmp_path / "controlled" / "dark"
-    kept.mkdir(parents=True)
-    (kept / "limit.json").write_text('{"psnr": 41.5, "detail": 0.97}')
-    assert controlled.measure(tmp_path, "dark") == {"limit": {"psnr": 41.5, "detail": 0.97}}
-    assert controlled.measure(tmp_path, "nobody") == {}

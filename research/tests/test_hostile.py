@@ -27,19 +27,8 @@ def test_hostile_inputs_do_no_harm():
     """Others each time; what is printed of a fault tells the seed, and WILDCAP_HOSTILE=COUNT:SEED tries the same ones
     again."""
     count, _, seed = os.environ.get("WILDCAP_HOSTILE", f"25:{secrets.randbelow(1_000_000)}").partition(":")
-    command = [
-        sys.executable,
-        "-m",
-        "research.benchmarks.hostile",
-        "--count",
-        count,
-        "--seed",
-        seed,
-        "--until",
-        "scan",
-        "--delighter",
-        "none",
-    ]
+    words = f"research.benchmarks.hostile --count {count} --seed {seed} --until scan --delighter none".split()
+    command = [sys.executable, "-m", *words]
     ended = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
     assert ended.returncode == 0, ended.stdout[-4000:] + ended.stderr[-2000:]
 

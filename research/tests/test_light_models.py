@@ -75,15 +75,6 @@ def test_regions_explain_a_shadow_that_they_were_laid_on():
     assert fitted(*light_models.light_by_regions(begun(lamp), FREE, 5))[1] < 0.1
 
 
-def test_an_even_sky_is_an_even_irradiance_and_a_point_is_a_cosine():
-    directions, lobe, pairs = light_models.cubemap()
-    assert torch.allclose(lobe.sum(1), torch.ones(len(lobe)), atol=1e-5)
-    k = 700
-    assert np.allclose(lobe[:, k] / lobe[k, k], np.maximum(directions @ directions[k], 0), atol=0.03)
-    assert np.degrees(np.arccos((directions[pairs[:, 0]] * directions[pairs[:, 1]]).sum(1).clip(-1, 1))).max() < 9
-    assert len(np.unique(pairs)) == len(directions)  # nobody is without neighbours, at the cube's corners either
-
-
 def test_the_table_marks_the_best_and_its_ties():
     def score(psnr, step):
         return {

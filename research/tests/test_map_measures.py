@@ -88,16 +88,6 @@ def test_doing_nothing_follows_both_and_a_flat_colour_neither():
     assert slope((albedo, albedo), (albedo, 2 * albedo), HERE) is None, "nothing differs but a gain"
 
 
-def test_an_answer_that_mixes_both_by_half_has_slopes_of_a_half_and_pixels_outside_count_nothing():
-    albedo, light, other = 0.3 * field(0.2), field(0.3), field(0.3)
-    lights = albedo * light, albedo * other
-    assert slope(tuple(albedo * np.sqrt(each) for each in (light, other)), lights, HERE) == pytest.approx(0.5)
-    inside = HERE.copy()
-    inside[:20] = False
-    spoilt = np.where(inside[..., None], albedo * other, 5.0)
-    assert slope((albedo * light, spoilt * [2, 3, 4]), lights, inside) == pytest.approx(1)
-
-
 def test_moles_are_found_where_they_are_and_lines_are_none():
     log = np.zeros((120, 120), np.float32)
     for y, x in ((30, 40), (80, 70)):

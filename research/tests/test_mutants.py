@@ -54,9 +54,3 @@ def test_a_fault_changes_one_line_and_another_layout_keeps_its_place():
     named = {"file": "a.py", "function": "Mask.grow", "kind": "BinOp", "position": 4}
     moved = ast.unparse(ast.parse(SOURCE)).replace("class Mask", "LIMIT = 3\n\n\nclass Mask")
     assert "3 / size" in mutants.put_fault(moved, named) and "3 / size" in mutants.put_fault(SOURCE, named)
-
-
-def test_a_place_that_is_gone_is_told():
-    for gone in ({"function": "Mask.shrink"}, {"position": 99}, {"kind": "BoolOp"}):
-        with pytest.raises(LookupError, match="Mask"):
-            mutants.put_fault(SOURCE, {"file": "a.py", "function": "Mask.grow", "kind": "BinOp", "position": 0, **gone})

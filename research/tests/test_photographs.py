@@ -9,7 +9,6 @@ import pytest
 
 pytest.importorskip("flip_evaluator")
 
-from core.capture.messages import Problem  # noqa: E402
 from core.imaging import images  # noqa: E402
 from research.benchmarks.captures.state_captures import landmarks_in_uv  # noqa: E402
 from research.benchmarks.delighting import (
@@ -60,15 +59,6 @@ def test_references_score_what_they_must(sitter, monkeypatch):
     assert scores["network"]["light_slope"] == pytest.approx(1, abs=0.1), "an answer that keeps the light"
 
 
-def test_a_refused_picture_is_taken_as_it_is(sitter, monkeypatch):
-    def refuse(srgb, settings):
-        raise Problem("No face was found.", "Choose another.")
-
-    monkeypatch.setitem(photographs.delight.PHOTOGRAPHERS, "network", refuse)
-    given = photographs.answer_photograph(sitter.srgb[0], sitter.albedo, sitter.face, "network")
-    assert (given["network"] == given[NOTHING]).all()
-
-
 def test_in_a_pair_one_thing_differs():
     pigment, light = pairs.pairs({"any": [9100]}, 128)
     assert (pigment.kind, light.kind) == ("pigment", "light") and pigment.group == "any"
@@ -78,9 +68,3 @@ def test_in_a_pair_one_thing_differs():
     assert slope(pigment.albedos, pigment.albedos, pigment.where) == pytest.approx(1)
     assert slope(light.albedos, linear[1], light.where) == 0
     assert slope(linear[1], linear[1], light.where) == pytest.approx(1)
-
-
-def test_missing_data_is_told(tmp_path):
-    for read in photographs.SITTERS.values():
-        with pytest.raises(Problem, match="--data"):
-            next(read(tmp_path))

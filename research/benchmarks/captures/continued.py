@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Captures that go on from another one's, and stages that are run in this very process, one after the other."""
 
-from __future__ import annotations
-
 import importlib
 import shutil
 from pathlib import Path
@@ -16,11 +14,11 @@ from core.settings.settings import Settings
 def begin_at_delight(source: Capture, folder: Path) -> Capture:
     """Return a capture in place of whatever is in the folder: the frames, cameras and head of another one, no more."""
     shutil.rmtree(folder, ignore_errors=True)
-    begun = Capture(folder)
+    copy = Capture(folder)
     for part in (source.frames, source.cameras):
-        shutil.copytree(part, begun.root / part.name)
-    shutil.copyfile(source.head, begun.head)
-    return begun
+        shutil.copytree(part, copy.root / part.name)
+    shutil.copyfile(source.head, copy.head)
+    return copy
 
 
 def run_stages(capture: Capture, settings: Settings, *stages: str) -> None:

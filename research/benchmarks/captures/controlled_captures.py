@@ -1,12 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The captures of research/benchmarks/light/controlled.py and their solves: a flash in the dark, a studio's even light,
-and the true albedo for frames.
+"""Captures and solves of research/benchmarks/light/controlled.py: a flash in the dark, even light, true frames.
 
 Each begins from frames, cameras and head of a capture of research/benchmarks/captures/people.py, works in a copy that
-is made once, and leaves an albedo map in the same UVs."""
-
-from __future__ import annotations
+is made once, and leaves an albedo map in the same UVs.
+"""
 
 import time
 from dataclasses import replace
@@ -32,6 +30,7 @@ from ..light.flash_light import write_delit
 from ..light.relit_maps import toned
 from .continued import begin_at_delight, run_stages
 
+load_prior = cache(load)
 EMPTY = np.zeros((64, 64), np.float32)
 
 
@@ -47,9 +46,8 @@ def flash(source: Capture, work: Capture, settings: Settings) -> Capture:
 
 
 def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict]:
-    """Return the solver's albedo, sRGB [S, S, 3], where the light is known and gone: even, one colour, held throughout;
-    and the seconds."""
-    began, prior = time.monotonic(), _prior()
+    """Return the solved albedo, sRGB [S, S, 3], with an even light held throughout, and the seconds."""
+    began, prior = time.monotonic(), load_prior()
     recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0, linear=0.0)
     evidence = read_evidence(capture, read_head(capture), settings.solve.size)
     start = start_solve(
@@ -76,8 +74,7 @@ def studio(source: Capture, work: Capture, settings: Settings) -> Capture:
 
 
 def by_the_stage(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict]:
-    """Return the solve stage's albedo, sRGB [S, S, 3]; its seconds, and the share of the seen face that the proposed
-    mask would have covered, in percent."""
+    """Return the albedo of the stage solve, sRGB [S, S, 3], its seconds, and the share of the face that is masked."""
     began = time.monotonic()
     run_stages(capture, from_json({"delight": {"delighter": "none"}}, settings), "solve")
     seconds, proposed = time.monotonic() - began, images.read_mask(capture.shadow_mask_auto)
@@ -87,9 +84,7 @@ def by_the_stage(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict
 
 
 def use_true_frames(source: Capture, truth: Path, work: Capture, settings: Settings) -> Capture:
-    """Has the wild capture's true albedo frames stand for delit ones, up to the texture; made once.
-
-    Returns `work`."""
+    """Return `work` with the wild capture's true albedo as delit frames, up to its texture; made once."""
     if not work.texture_confidence.is_file():
         begin_at_delight(source, work.root)
         true = from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings)
@@ -103,8 +98,3 @@ def as_albedo(capture: Capture, settings: Settings) -> np.ndarray:
     tone = np.array(read_given_tone(settings.solve.skin_tone).linear, np.float32)
     skin = images.read_data(capture.texture_confidence)[..., 0] * template.mask("skin", len(texture))
     return images.linear_to_srgb(toned(texture, tone, skin))
-
-
-@cache
-def _prior():
-    return load()

@@ -1,17 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The whole chain on the sample video, from nothing to a relit head, and its score against the known truth.
+"""Run the whole chain on the sample video, relight the head, and score it against the known truth.
 
     python -m research.benchmarks.captures.demo FOLDER [--quality draft|standard|film] [--json
         research/records/demo.json]
 
-Exit code 1 when the result does not beat both the raw video and the flat true tone. What is finished is not done twice.
+Exit code 1 if the result does not beat both the raw video and the flat true tone. Finished work is not done twice.
 """
 
-from __future__ import annotations
-
-import argparse
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -22,63 +18,38 @@ from core.capture.files import write_json
 from core.settings.settings import QUALITIES, from_json, preset
 
 from .. import figures
+from ..figures import SAMPLE
 from ..maps import albedo_score
 from .people import skin_tone
 
-SAMPLE = figures.ROOT / "research" / "people" / "sample"
 LIGHTS = ("three_point", "sun", "window")
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "demo")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--quality", choices=QUALITIES, default="standard")
-    parser.add_argument("--json", type=Path, help="where the figures go, such as research/records/demo.json")
-    arguments = parser.parse_args()
-    capture = Capture(arguments.folder.resolve() / "sample.wildcap")
+    options = parser.parse_args()
+    capture, tone = Capture(options.folder.resolve() / "sample.wildcap"), skin_tone(SAMPLE)
     started = time.monotonic()
-    tone = skin_tone(SAMPLE)
-    code = subprocess.call(
-        [
-            sys.executable,
-            "-m",
-            "core",
-            "run",
-            str(SAMPLE / "capture.mp4"),
-            str(capture.root),
-            "--quality",
-            arguments.quality,
-            "--skin-tone",
-            tone,
-        ],
-        cwd=figures.ROOT,
-    )
-    if code:
+    choice = ("--quality", options.quality, "--skin-tone", tone)
+    if code := figures.run_python("core", "run", SAMPLE / "capture.mp4", capture.root, *choice):
         return code
     print("Rendering the head under three lights with Cycles ...", flush=True)
-    code = subprocess.call(
-        [sys.executable, "-m", "research.benchmarks.pictures.render_capture", str(capture.root), *LIGHTS],
-        cwd=figures.ROOT,
-        stdout=subprocess.DEVNULL,
-    )
-    if code:  # Cycles fills standard output with its progress; what went wrong is on standard error
+    # quiet: Cycles fills standard output with its progress; errors are on standard error
+    if code := figures.run_python("research.benchmarks.pictures.render_capture", capture.root, *LIGHTS, quiet=True):
         return code
-    rows = {"WildCap": albedo_score.score_capture(capture, SAMPLE), **albedo_score.score_floors(SAMPLE)}
-    write_json(capture.root / "score.json", rows)
+    found = {"WildCap": albedo_score.score_capture(capture, SAMPLE), **albedo_score.score_floors(SAMPLE)}
+    write_json(capture.root / "score.json", found)
     # once more, with the renders
-    report.write(capture, from_json({"solve": {"skin_tone": tone}}, preset(arguments.quality)))
-    scores = albedo_score.rows(rows)
-    print("\n" + albedo_score.table({"rows": scores}))
+    report.write(capture, from_json({"solve": {"skin_tone": tone}}, preset(options.quality)))
+    rows = albedo_score.rows(found)
+    print("\n" + albedo_score.table({"rows": rows}))
     print(f"\nFinished after {(time.monotonic() - started) / 60:.1f} minutes.\nThe report: {capture.report}")
-    if arguments.json:
-        size = sum(path.stat().st_size for path in capture.root.rglob("*") if path.is_file())
-        figures.write_record(
-            arguments.json,
-            "demo",
-            "make demo",
-            {"views": rows["WildCap"]["views"], "rows": scores, "capture_gb": size / 1e9},
-        )
-    beaten = all(rows["WildCap"]["raw"]["psnr"] > rows[name]["raw"]["psnr"] for name in ("raw video", "flat true tone"))
+    size = sum(path.stat().st_size for path in capture.root.rglob("*") if path.is_file())
+    record = {"views": found["WildCap"]["views"], "rows": rows, "capture_gb": size / 1e9}
+    figures.write_record(options.json, "demo", "make demo", record)
+    beaten = all(rows["WildCap"]["psnr"] > rows[name]["psnr"] for name in ("raw video", "flat true tone"))
     if not beaten:
         print("The result does not beat both floors.", file=sys.stderr)
     return 0 if beaten else 1

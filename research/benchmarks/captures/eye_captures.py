@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""People with open eyes in a few frames with true cameras, and their heads half a millimetre off: what judges how eyes
-are found apart from how heads are.
+"""Photograph people with open eyes by true cameras, with heads half a millimetre off, to judge the eyes apart.
 
     python -m research.benchmarks.captures.eye_captures FOLDER [--only SEED ...] [--facekit FOLDER]
 
@@ -9,10 +8,6 @@ FOLDER/SEED.wildcap has frames, cameras and head; truth/ in it the closed and th
 each; what is there is not made again.
 """
 
-from __future__ import annotations
-
-import argparse
-import os
 from dataclasses import asdict
 from pathlib import Path
 
@@ -26,6 +21,7 @@ from core.imaging import images
 from ...people import sample, scene
 from ...people.lifelike import filmed, phone
 from ...people.lifelike.figure import make_figure
+from ..figures import command_line
 from .people_lights import KINDS
 from .shadow_captures import registered, write_views
 
@@ -41,11 +37,11 @@ EYES = {
 measured on them."""
 FRAMES, SAMPLES, SCALE = 10, 4, 5 / 6
 WHITE, TO = 97, 0.8
-"""Which percentile of the frames comes to how bright a pixel."""
+"""Percentile of the frames, and the level that it is brought to."""
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", type=int, nargs="+", choices=list(EYES), default=list(EYES))
     parser.add_argument("--facekit", type=Path, help="ICT-FaceKit's folder: without it they are other heads")
@@ -81,5 +77,4 @@ def photograph_person(folder: Path, seed: int, kind: str, facekit: Path | None) 
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     main()

@@ -1,8 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The frames of a film that a benchmark reads from its first to its last."""
-
-from __future__ import annotations
+"""Frames of a film that a benchmark reads from its first to its last."""
 
 from collections.abc import Iterator
 from pathlib import Path

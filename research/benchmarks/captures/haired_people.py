@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Photographs of people whose every hair is known: frames through a phone's pipeline, and the maps that their true
-albedo gives."""
-
-from __future__ import annotations
+"""Photographs of people whose every hair is known, and the maps that their true albedo gives."""
 
 from pathlib import Path
 
@@ -36,7 +33,7 @@ def photograph(folder: Path, figure: Figure) -> tuple[list[View], list[np.ndarra
     rng, taken = np.random.default_rng([seed, 91]), phone.sample_phone(seed)
     lamp = np.array([rng.uniform(-1, 1), -1, rng.uniform(0.2, 1)])
     lamp /= np.linalg.norm(lamp)
-    views, seen = [], []
+    views, colours = [], []
     for k, matrix in enumerate(scene.camera_path(seed, VIEWS)):
         path, albedo = folder / f"{k:05d}.png", folder / f"albedo_{k:05d}.npz"
         view = sample.view_of(matrix, SCALE)
@@ -52,12 +49,12 @@ def photograph(folder: Path, figure: Figure) -> tuple[list[View], list[np.ndarra
             with replacing(albedo) as temporary, open(temporary, "wb") as file:
                 np.savez_compressed(file, colour=colour.astype(np.float16))
         with np.load(albedo) as stored:
-            seen.append(stored["colour"].astype(np.float32))
-    return views, seen
+            colours.append(stored["colour"].astype(np.float32))
+    return views, colours
 
 
 def _look(world: Scene, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """Linear albedo and unit normals (of hair: the head's behind it) [H, W, 3]; 0 beside the person."""
+    """Return linear albedo and unit normals (behind hair the head's) [H, W, 3]; 0 beside the person."""
     face, bary, _ = raster.render_view(world.whole, view, OVER)
     hit = face >= 0
     colour = np.zeros((*hit.shape, 3), np.float32)
@@ -69,8 +66,7 @@ def _look(world: Scene, view: View) -> tuple[np.ndarray, np.ndarray]:
 
 
 def read_maps(figure: Figure, views: list[View], colours: list[np.ndarray]) -> tuple[HeadMaps, PartsShown]:
-    """Return the texture that the true albedo of the views makes, as maps (what none of them sees has the bare skin's),
-    and what the parser says of the views."""
+    """Return the maps of the views' true albedo, with bare skin where no view sees, and the parser's parts."""
     surface = Head(figure.head).unfold(SIZE)
     total, weights = np.zeros((SIZE, SIZE, 3)), np.zeros((SIZE, SIZE, 1))
     looks = [observe(view, hold(colour), surface, 1.0) for view, colour in zip(views, colours, strict=True)]
@@ -80,8 +76,10 @@ def read_maps(figure: Figure, views: list[View], colours: list[np.ndarray]) -> t
     bare = images.resize(figure.skin.diffuse, SIZE, SIZE)
     diffuse = np.where(weights > 1e-4, np.exp(total / np.maximum(weights, 1e-9)), bare).astype(np.float32)
     one = np.ones((SIZE, SIZE), np.float32)
-    seen = np.clip(weights[..., 0], 0, 1).astype(np.float32)
-    maps = HeadMaps(diffuse, one[..., None] * [0, 0, 1], 0.35 * one, seen, np.repeat(one[..., None], 3, 2), seen)
+    confidence = np.clip(weights[..., 0], 0, 1).astype(np.float32)
+    maps = HeadMaps(
+        diffuse, one[..., None] * [0, 0, 1], 0.35 * one, confidence, np.repeat(one[..., None], 3, 2), confidence
+    )
     return maps, tell_parts(looks, surface, Reporter("texture"))
 
 

@@ -1,33 +1,25 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Four people with eyes, hair and clothes, filmed whole, and two further lights for them and for the six bald people of
-research/benchmarks/captures/people.py.
+"""Film four people with eyes, hair and clothes, and photograph them and the six bald people in two further lights.
 
     python -m research.benchmarks.captures.likenesses FOLDER [--only NAME ...] [--lights own overcast below] [--facekit
         FOLDER]
     python -m research.benchmarks.captures.likenesses FOLDER --sheet docs/pictures/people.jpg [--facekit FOLDER]
 
-FOLDER/NAME has the video, capture.mp4, and the truth in the layout that research/benchmarks/maps/albedo_score.py says,
-with bare/ (albedo without hair), parts/, normal/, strands_*.npz, opened.obj, maps/ and light.json besides. In its own
-light a person sits in a room, and the chain begins with the video:
-
-    python -m core run FOLDER/NAME/capture.mp4 FOLDER/NAME.wildcap
-
-NAME_overcast and NAME_below have nothing behind the person and true cameras: FOLDER/NAME_overcast.wildcap begins at
-delight. So do those of the bald people; who was in overcast light before is photographed in hazy sun. What is there is
-not made again. With --facekit (ICT-FaceKit's folder) the heads' shape is derived from it too; without, they are other
-heads of the same people.
+FOLDER/NAME has capture.mp4 and the truth in the layout that research/benchmarks/maps/albedo_score.py reads, with bare/
+(albedo without hair), parts/, normal/, strands_*.npz, opened.obj, maps/ and light.json. In its own light a person sits
+in a room, and the chain begins with the video. NAME_overcast and NAME_below have nothing behind the person and true
+cameras, and begin at delight, as those of the bald people; who was in overcast light before is in hazy sun. Nothing is
+made twice. With --facekit (ICT-FaceKit's folder) the heads' shape is derived from it too; without, they are other heads
+of the same people.
 """
 
-from __future__ import annotations
-
-import argparse
-import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from ...people.lifelike.figure import make_figure
+from ..figures import command_line
 from ..pictures.likeness_sheet import write_sheet
 from . import people
 from .likeness_captures import film_person
@@ -36,8 +28,7 @@ from .people_lights import FURTHER, KINDS
 
 @dataclass(frozen=True)
 class Likeness:
-    """name: what the rule of its choice says; light: one of people_lights.KINDS, in which the person is filmed
-    whole."""
+    """One person: the name tells the rule by which the seed was chosen; the light is a key of people_lights.KINDS."""
 
     name: str
     seed: int
@@ -50,7 +41,7 @@ LIKENESSES = (
     Likeness("stubbled", 910004, "noon sun behind leaves"),
     Likeness("closed", 910001, "mixed lamps"),
 )
-"""The first seed from 910001 on with: cropped hair and a full beard; long hair with a fringe; short hair and stubble;
+"""First seed from 910001 on with: cropped hair and a full beard; long hair with a fringe; short hair and stubble;
 closed lids. None was chosen by eye."""
 HELD_BACK = (
     Likeness("bearded_2", 920033, "noon sun behind leaves"),
@@ -66,7 +57,7 @@ OTHERWISE = "hazy sun"
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     everybody = [person.name for person in (*LIKENESSES, *people.PEOPLE)]
     parser.add_argument("folder", type=Path)
     parser.add_argument(
@@ -108,7 +99,7 @@ def film_likeness(person: Likeness, folder: Path, lights: list[str], facekit: Pa
 
 
 def photograph_again(person: people.FilmedPerson, folder: Path, light: str) -> None:
-    """A bald person in another light, as research/benchmarks/captures/people.py does it."""
+    """Photograph a bald person in another light."""
     kind = LIGHTS[light] if LIGHTS[light] != person.light else OTHERWISE
     began = time.monotonic()
     people.make(people.FilmedPerson(f"{person.name}_{light}", person.seed, kind), folder)
@@ -116,5 +107,4 @@ def photograph_again(person: people.FilmedPerson, folder: Path, light: str) -> N
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     main()

@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The light in which the people of research/benchmarks/captures/people.py are photographed: from overcast to noon sun
-behind leaves, window bars, mixed lamps.
+"""Light of the synthetic people: from overcast to noon sun behind leaves, window bars and mixed lamps.
 
 World: metres, +Z up, the head's middle at the origin, its face towards -Y. Radiance is linear; the camera chooses the
 exposure.
 """
-
-from __future__ import annotations
 
 import numpy as np
 
@@ -31,8 +28,7 @@ def overcast(seed: int) -> SceneLight:
 
 
 def window_bars(seed: int) -> SceneLight:
-    """Return a low sun through a window's bars into a dim room; the window's sky lights that side of the face
-    softly."""
+    """Return a low sun through a window's bars into a dim room; the window's sky softly lights that side."""
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
     sun = Sun(_towards(38 * side, 24), 3.4, 0.0093, (1.0, 0.9, 0.74))
     window = _patch(panorama(ROOM, ROOM, (0.07, 0.05, 0.04)), _towards(60 * side, 18), 34, (1.5, 1.75, 2.1))
@@ -62,8 +58,7 @@ def haze(seed: int) -> SceneLight:
 
 
 def lamp_below(seed: int) -> SceneLight:
-    """Return a lamp on a table below the face, in a dim room: shading upside down, shadows that rise from nose and
-    lips."""
+    """Return a lamp on a table below the face, in a dim room: its shading is upside down."""
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
     return SceneLight(
         panorama((0.035, 0.034, 0.033), (0.04, 0.038, 0.035), (0.06, 0.045, 0.03)),
@@ -79,7 +74,7 @@ KINDS = {
     "hazy sun": haze,
 }
 FURTHER = {"overcast": overcast, "lamp from below": lamp_below}
-"""The lights in which every person is photographed again (research/benchmarks/captures/likenesses.py)."""
+"""Lights in which every person is photographed again (research/benchmarks/captures/likenesses.py)."""
 
 
 def panorama(zenith, horizon, ground) -> np.ndarray:
@@ -119,8 +114,10 @@ def _patch(picture: np.ndarray, towards: np.ndarray, width_deg: float, radiance:
 
 
 def _directions() -> np.ndarray:
-    """Unit directions [HEIGHT, 2 HEIGHT, 3] of a panorama's texels as Blender reads it: the middle column is +X, a
-    quarter to the right -Y."""
+    """Return the unit directions [HEIGHT, 2 HEIGHT, 3] of a panorama's texels in Blender.
+
+    The middle column is +X, a quarter to the right -Y.
+    """
     polar = (np.arange(HEIGHT) + 0.5)[:, None] / HEIGHT * np.pi
     azimuth = -((np.arange(2 * HEIGHT) + 0.5)[None] / (2 * HEIGHT) - 0.5) * 2 * np.pi
     return np.stack(

@@ -1,19 +1,16 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The head scan of Lee Perry-Smith (CC BY 3.0, www.triplegangers.com) under five lights, by true cameras.
+"""Film the head scan of Lee Perry-Smith (CC BY 3.0, www.triplegangers.com) under five lights, by true cameras.
 
     python -m research.benchmarks.captures.scan_captures DATA FOLDER [--lights NAME ...]
 
 DATA holds lee_perry_smith/ and lps_sun/, neither of which is part of this project. FOLDER/scan_NAME is the truth in the
-layout that research/benchmarks/maps/albedo_score.py says, FOLDER/scan_NAME.wildcap the capture: FRAMES frames and their
-cameras, so that the chain begins at scan. The scan's own map stands for the albedo, though it holds light itself: what
-differs between the five is the measure, not the distance to it. What is there is not made again."""
+layout that research/benchmarks/maps/albedo_score.py reads, FOLDER/scan_NAME.wildcap the capture: frames and their
+cameras, so that the chain begins at scan. The scan's own map stands for the albedo, though it holds light itself: the
+differences between the five are the measure, not the distance to it. Nothing is made twice.
+"""
 
-from __future__ import annotations
-
-import argparse
 import json
-import os
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -23,7 +20,6 @@ import numpy as np
 import trimesh
 
 from core.capture.capture import Capture
-from core.capture.files import replacing, write_json
 from core.geometry import raster
 from core.geometry.meshes import Mesh, joined, vertex_normals, write_obj
 from core.geometry.views import View
@@ -32,9 +28,10 @@ from core.settings.settings import Settings
 
 from ...people import sample, scene
 from ...people.lifelike import filmed, phone
-from .people import TRUTHS, exposure
+from ..figures import command_line
 from .people_lights import FURTHER, KINDS
 from .shadow_captures import write_views
+from .truth_files import Faces, exposure, true_frames, write_cameras, write_frame, write_tone
 
 FRAMES, SCALE, SAMPLES, SEED = 24, 5 / 6, 6, 930001
 LIGHTS = {
@@ -58,7 +55,7 @@ NEEDED = (
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("data", type=Path)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--lights", nargs="+", choices=LIGHTS, default=list(LIGHTS))
@@ -73,58 +70,33 @@ def main() -> None:
         photograph(options.data, options.folder.resolve(), light)
 
 
-def photograph(data: Path, folder: Path, name: str) -> Capture:
-    """Return the capture and truth of one light, made if they are not there; prints the minutes."""
-    target, capture = folder / f"scan_{name}", Capture(folder / f"scan_{name}.wildcap")
-    if (target / "skin_tone.txt").exists():  # written last
-        return capture
+def photograph(data: Path, folder: Path, name: str) -> None:
+    """Make the capture and truth of one light, if they are not there, and print the minutes."""
+    target, capture, work = (
+        folder / f"scan_{name}",
+        Capture(folder / f"scan_{name}.wildcap"),
+        folder / "rendered" / name,
+    )
+    if (target / "skin_tone.txt").exists():
+        return
     began = time.monotonic()
-    head, light = read_scan(data), (KINDS | FURTHER)[LIGHTS[name]](SEED)
-    albedo = images.read_linear(data / NEEDED[1])[..., :3]
-    work, cameras = folder / "rendered" / name, scene.camera_path(SEED, FRAMES)
+    head, light, cameras = read_scan(data), (KINDS | FURTHER)[LIGHTS[name]](SEED), scene.camera_path(SEED, FRAMES)
+    albedo, gloss = images.read_linear(data / NEEDED[1])[..., :3], images.read_data(data / NEEDED[2])
     relief = 2 * images.read_data(data / NEEDED[3])[..., :3] - 1
-    gloss = images.read_data(data / NEEDED[2])
-    skin = filmed.write_skin(
-        work,
-        head,
-        albedo,
-        gloss[..., 0] if gloss.ndim == 3 else gloss,
-        relief / np.linalg.norm(relief, axis=-1, keepdims=True),
-    )
-    filmed.render_parts(
-        work, SEED, {"skin": skin}, [], light, scene.Shot(cameras, range(FRAMES), SAMPLES, SCALE, room=False)
-    )
+    relief /= np.linalg.norm(relief, axis=-1, keepdims=True)
+    skin = filmed.write_skin(work, head, albedo, gloss[..., 0] if gloss.ndim == 3 else gloss, relief)
+    shot = scene.Shot(cameras, range(FRAMES), SAMPLES, SCALE, room=False)
+    filmed.render_parts(work, SEED, {"skin": skin}, [], light, shot)
     views = [sample.view_of(matrix, SCALE) for matrix in cameras]
-    caster, facial = raster.RayCaster(head), face_of(data, head)
+    caster = raster.RayCaster(head)
     opaque = raster.RayCaster(joined([head, light.blockers])) if light.blockers else caster
-    faces = {}
-    for frame in np.unique(np.linspace(1, FRAMES - 2, TRUTHS).round().astype(int)).tolist():
-        faces[frame] = _write_truth(
-            target,
-            frame,
-            views[frame],
-            LitScan(caster, opaque, albedo, facial, light.sun.direction if light.sun else None),
-        )
+    lit = LitScan(caster, opaque, albedo, face_of(data, head), light.sun.direction if light.sun else None)
+    faces = {frame: _write_truth(target, frame, views[frame], lit) for frame in true_frames(FRAMES)}
     write_obj(target / "head.obj", head)  # by it the five are known to be one person
-    placed = [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]
-    write_json(
-        target / "cameras.json",
-        {
-            "name": name,
-            "light": LIGHTS[name],
-            "focal_px": scene.FOCAL * SCALE,
-            "width": views[0].width,
-            "height": views[0].height,
-            "cameras": placed,
-        },
-    )
+    write_cameras(target, LIGHTS[name], cameras, SCALE, name=name)
     write_views(capture, views, _developed(work, faces), min(Settings().frames.views, FRAMES))
-    total = sum(true[face].sum(0, dtype=np.float64) for true, face in faces.values())
-    tone = total / sum(int(face.sum()) for _, face in faces.values())
-    with replacing(target / "skin_tone.txt") as temporary:
-        temporary.write_text(",".join(f"{c:.4f}" for c in images.linear_to_srgb(tone)) + "\n", encoding="ascii")
+    write_tone(target, faces)
     print(f"{name}: {(time.monotonic() - began) / 60:.1f} min", flush=True)
-    return capture
 
 
 def read_scan(data: Path) -> Mesh:
@@ -147,10 +119,10 @@ def face_of(data: Path, head: Mesh) -> np.ndarray:
         matrix = np.array(entry["matrix_world"])
         matrix[:3, 3] = matrix[:3, 3] * METRES - MIDDLE
         view = sample.view_of(matrix, record["width"] / scene.WIDTH)
-        seen = raster.visible_from(caster, head.vertices, normals, view.centre)
-        pixels, _ = view.project(head.vertices[seen])
+        visible = raster.visible_from(caster, head.vertices, normals, view.centre)
+        pixels, _ = view.project(head.vertices[visible])
         inside = ((pixels > 0) & (pixels < [view.width, view.height])).all(1)
-        rows = np.flatnonzero(seen)[inside]
+        rows = np.flatnonzero(visible)[inside]
         total[rows] += raster.sample(images.read_mask(path), pixels[inside])
         count[rows] += 1
     return total / np.maximum(count, 1)
@@ -158,8 +130,11 @@ def face_of(data: Path, head: Mesh) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LitScan:
-    """The scan ready for rays; opaque: it with all that throws shadows; its albedo [S, S, 3], linear; facial [V] in [0,
-    1], how far a vertex is facial skin; sun [3]: unit direction to it, None where there is none."""
+    """Scan ready for rays.
+
+    opaque: with all that throws shadows; albedo: linear [S, S, 3]; facial [V] in [0, 1]: share of facial skin of each
+    vertex; sun [3]: unit direction to it, None without one.
+    """
 
     caster: raster.RayCaster
     opaque: raster.RayCaster
@@ -169,7 +144,7 @@ class LitScan:
 
 
 def _write_truth(target: Path, frame: int, view: View, scan: LitScan, over: int = 2) -> tuple[np.ndarray, np.ndarray]:
-    """albedo/, face/ and shadow/ of a frame; its albedo [h, w, 3] and facial skin bool [h, w]."""
+    """Write albedo/, face/ and shadow/ of a frame; return its albedo [h, w, 3] and facial skin, bool [h, w]."""
     head, albedo, sun = scan.caster.mesh, scan.albedo, scan.sun
     face, bary, _ = raster.render_view(scan.caster, view, over)
     hit = face >= 0
@@ -181,34 +156,23 @@ def _write_truth(target: Path, frame: int, view: View, scan: LitScan, over: int 
     if sun is not None:
         points = raster.interpolate(head.vertices, head.faces, face, bary)[hit]
         normals = raster.interpolate(vertex_normals(head), head.faces, face, bary)[hit]
-        towards_sun = np.repeat(sun[None], len(points), 0)
-        dark[hit] = (normals @ sun <= 0) | scan.opaque.blocked(points + 5e-4 * normals, towards_sun)
+        blocked = scan.opaque.blocked(points + 5e-4 * normals, np.repeat(sun[None], len(points), 0))
+        dark[hit] = (normals @ sun <= 0) | blocked
     cover, colour, skin, dark = (
         images.resize(values, view.width, view.height) for values in (hit.astype(np.float32), colour, skin, dark)
     )
-    colour, face, name = colour / np.maximum(cover, 1e-6)[..., None], (skin > 0.5) & (cover > 0.99), f"{frame:04d}.png"
-    for folder in ("albedo", "face", *(["shadow"] if sun is not None else [])):
-        (target / folder).mkdir(parents=True, exist_ok=True)
-    images.write_srgb(target / "albedo" / name, np.concatenate([images.linear_to_srgb(colour), cover[..., None]], -1))
-    images.write_data(target / "face" / name, face.astype(np.float32))
-    if sun is not None:
-        images.write_data(target / "shadow" / name, (dark > 0.5).astype(np.float32))
+    colour, face = colour / np.maximum(cover, 1e-6)[..., None], (skin > 0.5) & (cover > 0.99)
+    write_frame(target, frame, colour, cover, face=face, shadow=None if sun is None else dark > 0.5)
     return colour, face
 
 
-def _developed(work: Path, faces: dict[int, tuple[np.ndarray, np.ndarray]]) -> Iterator[np.ndarray]:
-    """Return the frames as a phone shows them that stands still, sRGB [H, W, 3]."""
-    filmed = {frame: images.read_linear(work / f"{frame:05d}.exr") for frame in faces}
-    gain, taken = exposure(filmed, faces), phone.sample_phone(SEED)
+def _developed(work: Path, faces: Faces) -> Iterator[np.ndarray]:
+    """Yield the frames as a phone that stands still shows them, sRGB [H, W, 3]."""
+    gain, taken = exposure(work, faces), phone.sample_phone(SEED)
     for frame in range(FRAMES):
-        yield phone.develop(
-            images.read_linear(work / f"{frame:05d}.exr").astype(np.float32),
-            taken,
-            gain,
-            np.random.default_rng([SEED, 72, frame]),
-        )
+        linear = images.read_linear(work / f"{frame:05d}.exr").astype(np.float32)
+        yield phone.develop(linear, taken, gain, np.random.default_rng([SEED, 72, frame]))
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     main()

@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Captures with a known shadow mask, for research/benchmarks/delighting/shadow_mask.py: synthetic people under a sun
-that the head itself and leaves, blinds or an edge block.
+"""Captures with a known shadow mask: synthetic people under a sun that the head, leaves, blinds or an edge block.
 
 The light of research/people/light.py is baked into a subject's UVs and photographed by known cameras, with noise and
 JPEG; the registered head is the true one, off by half a millimetre here and there, as a fit leaves it.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -47,8 +44,10 @@ KINDS = ("self", "leaves", "blinds", "edge")
 
 
 def synthetic_capture(seed: int, kind: str, folder: Path) -> tuple[Capture, np.ndarray]:
-    """Return a capture with frames, cameras and head in `folder` (made once) and the true shadow in its head's UVs,
-    bool [SIZE, SIZE]: where the sun does not reach, be it that the surface turns away from it."""
+    """Return a capture with frames, cameras and head, made once, and its true shadow, bool [SIZE, SIZE].
+
+    The shadow is in the head's UVs, and includes surface that turns away from the sun.
+    """
     capture = Capture(folder)
     if not (capture.root / "truth.png").is_file():
         mesh, skin = subject_mesh(seed), make_skin(sample_parameters(seed), SIZE)
@@ -62,8 +61,7 @@ def synthetic_capture(seed: int, kind: str, folder: Path) -> tuple[Capture, np.n
 
 
 def lifted_truth(capture: Capture, truth: Path, size: int = SIZE) -> np.ndarray:
-    """Return the true shadow of TRUTH/shadow/NNNN.png (NNNN: frame of the video) in the UVs of a capture's head, bool
-    [size, size]."""
+    """Return the true shadow TRUTH/shadow/NNNN.png (frame of the video) in the head's UVs, bool [size, size]."""
     frames = read_frames(capture).by_name
     pictures = {int(path.stem): path for path in (truth / "shadow").glob("*.png")}
     views = [
@@ -76,8 +74,7 @@ def lifted_truth(capture: Capture, truth: Path, size: int = SIZE) -> np.ndarray:
 
 
 def _lit(mesh: Mesh, seed: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
-    """Shading [S, S, 3] and the true shadow bool [S, S] under the first of the seed's random lights whose shadow is
-    one."""
+    """Return shading [S, S, 3] and true shadow, bool [S, S], of the seed's first random light with a real shadow."""
     face = template.mask("face", 64) > 0.5
     for i in range(1000):
         light = random_light(np.random.default_rng([seed, 30, i]))
@@ -93,8 +90,7 @@ def _lit(mesh: Mesh, seed: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
 def _shadow(
     mesh: Mesh, size: int, light: SkyAndSun, kind: str, seeds: tuple
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Shading [S, S, 3], where the sun does not reach bool [S, S], and the share of the light that whatever stands in
-    the sun's way takes [S, S]."""
+    """Return the shading [S, S, 3], the shadow, bool [S, S], and the share of the light that is blocked [S, S]."""
     shading, blocked, normal = bake(mesh, size, light, kind, np.random.default_rng(seeds))
     cosine = normal @ light.sun
     sunlit = shading.mean(-1) + np.maximum(cosine, 0) * blocked * light.colour.mean()
@@ -110,7 +106,7 @@ def registered(mesh: Mesh, seed: int) -> Mesh:
 
 
 def _photograph(capture: Capture, mesh: Mesh, texture: np.ndarray, rng: np.random.Generator) -> None:
-    """frames/ with frames.json, and cameras/, of a lit texture, linear [S, S, 3]."""
+    """Write frames/ with frames.json, and cameras/, of a lit texture, linear [S, S, 3]."""
     caster = raster.RayCaster(mesh)
     views = [
         place_camera(azimuth, 0.0 if i < len(AZIMUTHS) - 1 else -0.25, scale=SCALE)
@@ -158,5 +154,5 @@ def render_picture(
     wall = cv2.resize(
         rng.uniform(0.02, 0.3, (9, 7, 3)).astype(np.float32), (view.width, view.height), interpolation=cv2.INTER_CUBIC
     )
-    seen = images.linear_to_srgb(cv2.GaussianBlur(head + (1 - cover)[..., None] * wall, (0, 0), 0.6))
-    return np.clip(seen + rng.normal(0, NOISE, seen.shape), 0, 1).astype(np.float32)
+    srgb = images.linear_to_srgb(cv2.GaussianBlur(head + (1 - cover)[..., None] * wall, (0, 0), 0.6))
+    return np.clip(srgb + rng.normal(0, NOISE, srgb.shape), 0, 1).astype(np.float32)

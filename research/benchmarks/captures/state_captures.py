@@ -1,13 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The captures that research/benchmarks/delighting/state.py measures, as maps in the UVs of their heads: the answers,
-the truth as their own cameras show it, and the normals.
+"""Captures that research/benchmarks/delighting/state.py measures, as maps in the UVs of their heads.
 
 A folder holds NAME.wildcap and beside it, or in another folder, NAME/ with the truth
 (research/benchmarks/maps/albedo_score.py says its layout; head.obj, the true head, tells which captures show the same
-person; maps/part_NAME.png are masks in the head's UVs, where there are any)."""
-
-from __future__ import annotations
+person; maps/part_NAME.png are masks in the head's UVs, where there are any).
+"""
 
 import argparse
 from dataclasses import dataclass
@@ -40,8 +38,10 @@ PARTS = ("skin", "brows", "lips", "eyes")
 
 @dataclass(frozen=True)
 class Filmed:
-    """One capture with its truth; person: the name of the first truth, in order of names, with the same true head;
-    work: where what is made of it is kept."""
+    """One capture with its truth.
+
+    person: the first name, in order, of the truths with the same head; work: folder for what is made of it.
+    """
 
     name: str
     person: str
@@ -55,8 +55,10 @@ class Filmed:
 
     @cached_property
     def true_capture(self) -> Capture:
-        """Return a copy whose delit frames are the true albedo, up to its texture; made once, and again where the head
-        or the cameras changed."""
+        """Return a copy whose delit frames are the true albedo, up to its texture.
+
+        Made once, and again if the head or the cameras changed.
+        """
         copy = Capture(self.work / f"{self.name}.wildcap")
         same = ("head.obj", "cameras/cameras.bin", "cameras/images.bin")
         changed = copy.texture_confidence.is_file() and any(
@@ -67,21 +69,11 @@ class Filmed:
         return use_true_frames(self.capture, self.truth, copy, Settings())
 
     def inputs(self) -> list[Path]:
-        """Return the files that the figures of this capture depend on, but for the truth's pictures."""
+        """Return the files that the figures of this capture depend on, without the truth's pictures."""
         capture = self.capture
-        return [
-            path
-            for path in (
-                capture.head,
-                capture.texture_filmed,
-                capture.texture,
-                capture.texture_confidence,
-                capture.maps / "diffuse_albedo.png",
-                self.truth / "cameras.json",
-                self.truth / "head.obj",
-            )
-            if path.is_file()
-        ]
+        maps = capture.texture_filmed, capture.texture, capture.texture_confidence, capture.maps / "diffuse_albedo.png"
+        paths = capture.head, *maps, self.truth / "cameras.json", self.truth / "head.obj"
+        return [path for path in paths if path.is_file()]
 
     @cached_property
     def truth_map(self) -> np.ndarray:
@@ -90,14 +82,16 @@ class Filmed:
 
     @cached_property
     def where(self) -> np.ndarray:
-        """bool [SIZE, SIZE]: texels of the face that the capture and its true frames saw well. Of a person's own eyes
-        and their lashes there are none: the true frames have them painted on the lids, where an answer has lids that
-        were completed from around."""
-        seen = [
+        """Return the texels of the face that the capture and its true frames saw well, bool [SIZE, SIZE].
+
+        A person's own eyes and lashes are left out: the true frames have them painted on the lids, where an answer has
+        lids that were completed from around.
+        """
+        confident = [
             images.resize(images.read_data(capture.texture_confidence)[..., 0], SIZE, SIZE) > SEEN
             for capture in (self.capture, self.true_capture)
         ]
-        face = (template.mask("face", SIZE) > 0.5) & seen[0] & seen[1]
+        face = (template.mask("face", SIZE) > 0.5) & confident[0] & confident[1]
         eyes = self.own_parts().get("eyes")
         if eyes is None:
             return face
@@ -120,21 +114,18 @@ class Filmed:
 
     @cached_property
     def normals(self) -> np.ndarray:
-        """Unit normals [SIZE, SIZE, 3] in the axes of the built-in head, however the capture's world lies; zero off the
-        head."""
+        """Return unit normals [SIZE, SIZE, 3] in the axes of the built-in head; zero off the head."""
         unfolded = self.head.unfold(SIZE)
         return unfolded.spread(unfolded.normals @ rotation_between(self.head.mesh.vertices, template.load().vertices).T)
 
     def parts(self) -> dict[str, np.ndarray]:
-        """Part -> bool [SIZE, SIZE]: the truth's own masks where it has any, else those of the built-in head, where
-        they are at least half as dense as where they are densest. Skin is what no other part has."""
+        """Return part -> bool [SIZE, SIZE], the truth's own masks before the built-in head's; skin is the rest."""
         found = {name: _dense(template.mask(name, SIZE)) for name in PARTS} | self.own_parts()
         others = np.logical_or.reduce([mask for name, mask in found.items() if name != "skin"])
         return {**found, "skin": found["skin"] & ~others}
 
     def own_parts(self) -> dict[str, np.ndarray]:
-        """Part -> bool [SIZE, SIZE]: the truth's own masks; none where the head's eyes are closed and it has no
-        hair."""
+        """Return part -> bool [SIZE, SIZE] of the truth's own masks."""
         return {
             path.stem.removeprefix("part_"): _dense(images.read_mask(path))
             for path in sorted((self.truth / "maps").glob("part_*.png"))
@@ -142,44 +133,48 @@ class Filmed:
 
 
 def _dense(mask: np.ndarray) -> np.ndarray:
-    """bool [SIZE, SIZE]: where a mask is at least half as dense as where it is densest."""
+    """Return the texels where a mask is at least half as dense as its maximum, bool [SIZE, SIZE]."""
     soft = images.resize(mask, SIZE, SIZE)
     return soft > 0.5 * max(float(soft.max()), 1e-3)
 
 
 def find(folder: Path, truths: Path, work: Path) -> list[Filmed]:
-    """Return the captures of a folder that have a texture and a truth, in order of their names. Who a person is, the
-    truths say: the name stays when a capture is finished later than others."""
+    """Return the captures of a folder that have a texture and a truth, by name.
+
+    The truths tell who a person is, so the name stays when another capture is finished later.
+    """
     first: dict[str, str] = {}
     for truth in sorted(path.parent for path in truths.glob("*/albedo") if path.is_dir()):
         first.setdefault(_true_head(truth), truth.name)
-    pairs = [(path.stem, Capture(path), truths / path.stem) for path in sorted(folder.glob("*.wildcap"))]
-    pairs = [
-        (name, capture, truth)
-        for name, capture, truth in pairs
-        if capture.texture.is_file() and (truth / "albedo").is_dir()
+    captures = [Capture(path) for path in sorted(folder.glob("*.wildcap"))]
+    pairs = [(capture, truths / capture.root.stem) for capture in captures if capture.texture.is_file()]
+    return [
+        Filmed(truth.name, first[_true_head(truth)], capture, truth, work)
+        for capture, truth in pairs
+        if (truth / "albedo").is_dir()
     ]
-    return [Filmed(name, first[_true_head(truth)], capture, truth, work) for name, capture, truth in pairs]
 
 
 def add_captures(parser: argparse.ArgumentParser) -> None:
-    """The arguments that name captures with a truth."""
+    """Add the arguments that name captures with a truth."""
     parser.add_argument("folder", type=Path)
     parser.add_argument("--truths", type=Path, help="where NAME/ with the truth lies, if not in FOLDER")
     parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
 
 
-def captures_asked(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> list[Filmed]:
-    """Return the captures that these arguments name; ends with an error where there are none."""
-    folder = arguments.folder.resolve()
-    found = [
-        filmed
-        for filmed in find(folder, (arguments.truths or folder).resolve(), folder / "state")
-        if filmed.name.startswith(tuple(arguments.only))
-    ]
+def captures_asked(parser: argparse.ArgumentParser, options: argparse.Namespace) -> list[Filmed]:
+    """Return the captures that these arguments name; end with an error if there are none."""
+    found = chosen_captures(options)
     if not found:
-        parser.error(f"{folder} holds no capture with a texture and a truth.")
+        parser.error(f"{options.folder} holds no capture with a texture and a truth.")
     return found
+
+
+def chosen_captures(options: argparse.Namespace) -> list[Filmed]:
+    """Return the captures that the arguments of `add_captures` name."""
+    folder = options.folder.resolve()
+    captures = find(folder, (options.truths or folder).resolve(), folder / "state")
+    return [filmed for filmed in captures if filmed.name.startswith(tuple(options.only))]
 
 
 def landmarks_in_uv(size: int = SIZE) -> np.ndarray:
@@ -190,8 +185,7 @@ def landmarks_in_uv(size: int = SIZE) -> np.ndarray:
 
 
 def rotation_between(points: np.ndarray, targets: np.ndarray) -> np.ndarray:
-    """Return the rotation [3, 3] that brings points [N, 3] nearest to targets [N, 3] of the same order (Kabsch
-    1976)."""
+    """Return the rotation [3, 3] that brings points [N, 3] nearest to targets [N, 3] (Kabsch 1976)."""
     u, _, vt = np.linalg.svd((points - points.mean(0)).T @ (targets - targets.mean(0)))
     return vt.T @ np.diag([1, 1, np.sign(np.linalg.det(vt.T @ u.T))]) @ u.T
 

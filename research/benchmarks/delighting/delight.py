@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How well the delighters take the light out of photographs whose albedo is known, set by set, beside no delighting and
-the flat true tone.
+"""Compare delighters, no delighting and the flat true tone on photographs whose albedo is known, set by set.
 
     python -m research.benchmarks.delighting.delight [--data DIR] [--sets NAME ...] [--capture NAME=FOLDER ...]
         [--opendelight PATH] [--quick] [--json OUT]
@@ -10,22 +9,13 @@ the flat true tone.
 Sets: faceolat (--data: laid out like ../shared/data/faceolat), portraits (synthetic subjects that no training sees, six
 per group of skin tone, two lights each), lps_sun, sample, or any folder laid out as
 research/benchmarks/maps/albedo_score.py says. A capture is registered anew unless --capture names one. Rows: none, flat
-true tone, then on captures each delighter of the chain that needs no pictures, no account and no checkpoint, and
-everywhere each that can do a single photograph. Figures (research/benchmarks/delighting/delight_measures.py) are means
-over the pictures:
-  PSNR, SSIM, FLIP   over the facial skin, after one gain per channel
-  features           the distance in EfficientNet-Lite0's features, which is not LPIPS
-  detail             correlation of log green between 1 and 3 px with the truth's
-  shadow step        what is left of the light's step at the true shadow's edge, where it exceeds 0.2 in natural log;
-                     `none` has all of it
---picture shows six photographs of one set, the truth and the rows; only of synthetic people in the documentation.
+true tone, on captures each delighter that needs no pictures, account or checkpoint, and everywhere each that takes
+single photographs. Figures (research/benchmarks/delighting/delight_measures.py) are means over the pictures.
+--picture shows six photographs of one set, the truth and the rows; only synthetic people in the documentation.
 """
-
-from __future__ import annotations
 
 import argparse
 import importlib
-import json
 import sys
 import tempfile
 import time
@@ -42,97 +32,54 @@ from core.settings.settings import Settings
 from core.stages import delight
 
 from .. import figures
+from ..figures import SAMPLE, SHARED
 from ..measures.pictures import with_gain
+from ..measures.table import mean_of
 from ..pictures.sheet import write_small
-from .delight_measures import flat_tone, mean_of, score_picture, sheet, shortfalls, square, table, tone_group
+from .delight_measures import flat_tone, score_picture, sheet, shortfalls, square, table, tone_group
 from .delight_portraits import make_portraits
 from .delight_sets import Photograph, Photographs, light_stage, registered, select_true_frames
 
-SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
-SAMPLE = Path(__file__).resolve().parents[3] / "research" / "people" / "sample"
 SETS = ("faceolat", "portraits", "lps_sun", "sample")
 BROUGHT = ("none", "folder", "switchlight", "opendelight")
 """Delighters that need something of the user's, or nothing at all: no rows of their own on captures."""
 FLAT = "flat true tone"
+COMMAND = "python -m research.benchmarks.delighting.delight [--data DIR]"
 QUICK = 4  # every n-th picture
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        prog="python -m research.benchmarks.delighting.delight",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument(
-        "--data", type=Path, default=SHARED / "faceolat", help="photographs with their albedo, laid out like faceolat"
-    )
-    parser.add_argument(
-        "--sets", nargs="+", default=SETS, help=f"of {', '.join(SETS)}, or folders with capture.mp4, albedo and face"
-    )
+    parser = figures.command_line(__doc__, "delight")
+    parser.add_argument("--data", type=Path, default=SHARED / "faceolat", help="photographs laid out like faceolat")
+    parser.add_argument("--sets", nargs="+", default=SETS, help=f"of {', '.join(SETS)}, or folders of a truth")
     parser.add_argument("--rows", nargs="+", help="only rows whose name begins with one of these")
-    parser.add_argument(
-        "--capture", action="append", default=[], metavar="NAME=FOLDER", help="a registered capture of that set"
-    )
-    parser.add_argument(
-        "--work",
-        type=Path,
-        default=Path(tempfile.gettempdir()) / "wildcap_delight",
-        help="where captures are made and kept",
-    )
+    parser.add_argument("--capture", action="append", default=[], metavar="NAME=FOLDER", help="registered, of that set")
+    work = Path(tempfile.gettempdir()) / "wildcap_delight"
+    parser.add_argument("--work", type=Path, default=work, help="folder in which captures are made and kept")
     parser.add_argument("--opendelight", default="", help="the authors' checkpoint")
-    parser.add_argument(
-        "--weights",
-        type=Path,
-        help="weights of our network, with their card beside them, instead of those that are shipped",
-    )
-    parser.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
+    parser.add_argument("--weights", type=Path, help="other weights of our network, with their card beside them")
     parser.add_argument("--quick", action="store_true", help=f"every {QUICK}th picture, without the feature distance")
-    parser.add_argument("--json", type=Path, help="where the results go; what it holds of other sets and rows stays")
     parser.add_argument("--picture", type=Path, help="six photographs of the set, truth and rows side by side")
     options = parser.parse_args()
     if options.picture and len(options.sets) != 1:
         parser.error("--picture shows one set: name it with --sets")
-    settings = Settings(device=options.device)
-    if options.opendelight:
-        settings = replace(settings, delight=replace(settings.delight, checkpoint=options.opendelight))
+    settings = Settings(device="cpu")
+    settings = replace(settings, delight=replace(settings.delight, checkpoint=options.opendelight))
     if options.weights:
         importlib.import_module("core.stages.delight.network").WEIGHTS = options.weights
     captures = dict(pair.split("=", 1) for pair in options.capture)
-    results = (
-        figures.read_record(options.json.stem, options.json.parent)["figures"]
-        if options.json and options.json.is_file()
-        else {}
-    )
+    results = figures.read_figures(options.json)
     for name in options.sets:
-        title = Path(name).name
         with tempfile.TemporaryDirectory() as folder:
             try:
-                found = measure_rows(
-                    _set(name, options, captures, Path(folder)),
-                    settings,
-                    not options.quick,
-                    options.rows,
-                    options.picture,
-                )
+                chosen = _set(name, options, captures, Path(folder))
+                found = measure_rows(chosen, settings, not options.quick, options.rows, options.picture)
             except Problem as problem:
                 found = {"-": {"not_run": f"{problem.problem} {problem.remedy}"}}
-        results[title] = {**results.get(title, {}), **found}
-        if options.json:
-            figures.write_record(
-                options.json, "delight", "python -m research.benchmarks.delighting.delight [--data DIR]", results
-            )
-    print(table(results))
-    if any(
-        row.startswith("network") and "figures" in found for rows_ in results.values() for row, found in rows_.items()
-    ):
-        print(
-            "",
-            "Where the network is no better than no delighting or the delighter shading:",
-            *(shortfalls(results) or ["nowhere."]),
-            sep="\n",
-        )
-    if options.json is None:
-        print(json.dumps(results, indent=1))
+        results.setdefault(Path(name).name, {}).update(found)
+        figures.write_record(options.json, "delight", COMMAND, results)
+    print(table(results), "\nWhere the network is no better than no delighting or the delighter shading:", sep="\n")
+    print(*(shortfalls(results) or ["nowhere"]), sep="\n")
 
 
 def measure_rows(
@@ -144,13 +91,14 @@ def measure_rows(
 ) -> dict[str, dict]:
     """Score each row's answers to a set of photographs. One that a delighter refuses counts as it is.
 
-    features: whether the feature distance is measured, too; only: what the names of the rows begin with that are
-    asked for; None: all; picture: file that shows six photographs' answers beside each other. Returns Row ->
-    {pictures, refused, figures, groups, seconds_per_picture}, or {not_run: why}."""
+    features: measure the feature distance, too; only: beginnings of the names of the rows, None: all; picture: file
+    that shows six photographs' answers side by side. Returns row -> {pictures, refused, figures, groups,
+    seconds_per_picture}, or {not_run: why}.
+    """
     results, shown = {}, []
     spread = chosen.photographs[:: max(1, len(chosen.photographs) // 6)][:6]
     for row in rows(chosen, settings):
-        if only and not any(row.startswith(name) for name in only):
+        if only and not row.startswith(tuple(only)):
             continue
         scores, groups, delit, refused, alike, seconds, started = [], {}, {}, [], {}, 0.0, time.monotonic()
         try:
@@ -159,11 +107,12 @@ def measure_rows(
                 if isinstance(predicted, Problem):  # the artist would go on with the picture as it is
                     refused.append(predicted)
                     predicted = photograph.srgb
-                # scores the same under every light
-                flat = id(photograph.truth) if row == FLAT and photograph.truth.shadow is None else None
-                scores.append(alike.get(flat) or score_picture(predicted, photograph.srgb, photograph.truth, features))
+                truth = photograph.truth
+                # a flat tone scores the same under every light
+                flat = id(truth) if row == FLAT and truth.shadow is None else None
+                scores.append(alike.get(flat) or score_picture(predicted, photograph.srgb, truth, features))
                 alike |= {flat: scores[-1]} if flat else {}
-                groups.setdefault(photograph.group or tone_group(flat_tone(photograph.truth)), []).append(scores[-1])
+                groups.setdefault(photograph.group or tone_group(flat_tone(truth)), []).append(scores[-1])
                 delit[photograph.name] = predicted
                 print(f"\r{row}: {len(scores)}", end="", file=sys.stderr, flush=True)
                 started = time.monotonic()
@@ -182,15 +131,8 @@ def measure_rows(
         shown.append([_shown(delit[p.name], p) for p in spread])
     print(file=sys.stderr)
     if picture:
-        write_small(
-            picture,
-            sheet(
-                [
-                    [square(p.srgb, p.truth.face), _shown(p.truth.albedo, p), *delit]
-                    for p, *delit in zip(spread, *shown, strict=True)
-                ]
-            ),
-        )
+        pairs = [[square(p.srgb, p.truth.face), _shown(p.truth.albedo, p)] for p in spread]
+        write_small(picture, sheet([[*pair, *answers] for pair, *answers in zip(pairs, *shown, strict=True)]))
     return results
 
 
@@ -206,35 +148,26 @@ def rows(chosen: Photographs, settings: Settings) -> list[str]:
 
 
 def predictions(row: str, chosen: Photographs, settings: Settings) -> Iterator[tuple[Photograph, np.ndarray | Problem]]:
-    """Return each photograph of a set with what a row takes for its albedo, sRGB [H, W, 3], or why it does not serve
-    it."""
-    if row in ("none", FLAT):
-        for photograph in chosen.photographs:
-            yield (
-                photograph,
-                photograph.srgb
-                if row == "none"
-                else np.broadcast_to(flat_tone(photograph.truth), photograph.srgb.shape),
-            )
-    elif row.endswith(", one photograph"):
-        for photograph in chosen.photographs:
-            try:
-                photographer = delight.PHOTOGRAPHERS[row.removesuffix(", one photograph")]
-                predicted = photographer(photograph.srgb, settings.delight)[0]
-            except Problem as problem:
-                predicted = problem
-            yield photograph, predicted
-    else:
+    """Yield each photograph with a row's albedo, sRGB [H, W, 3], or the problem that the delighter raised."""
+    name = row.removesuffix(", one photograph")
+    if name == row and row not in ("none", FLAT):
         by_frame = {photograph.frame: photograph for photograph in chosen.photographs}
         for delit in delight.DELIGHTERS[row](chosen.capture, settings, Reporter("delight")):
             if (photograph := by_frame.get(delit.view.name)) is not None:
                 height, width = photograph.srgb.shape[:2]
-                yield (
-                    photograph,
-                    delit.image
-                    if delit.image.shape[:2] == (height, width)
-                    else images.resize(delit.image, width, height),
-                )
+                same = delit.image.shape[:2] == (height, width)
+                yield photograph, delit.image if same else images.resize(delit.image, width, height)
+        return
+    for photograph in chosen.photographs:
+        predicted = photograph.srgb
+        if row == FLAT:
+            predicted = np.broadcast_to(flat_tone(photograph.truth), predicted.shape)
+        elif row != "none":
+            try:
+                predicted = delight.PHOTOGRAPHERS[name](predicted, settings.delight)[0]
+            except Problem as problem:
+                predicted = problem
+        yield photograph, predicted
 
 
 def _set(name: str, options: argparse.Namespace, captures: dict[str, str], work: Path) -> Photographs:

@@ -1,18 +1,17 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each of the delighter's answers is worth in captures, and each step that puts them together; and how far the
-fitted light is best believed beside the frames' own (core/stages/delight/second_opinion.py), chosen by leaving one
-person out.
+"""Judge each of the delighter's answers in captures, and each step that combines them.
 
     python -m research.benchmarks.delighting.delight_answers FOLDER [--truths FOLDER] [--only PREFIX ...]
-    [--sample CAPTURE] [--eyes FOLDER [--facekit FOLDER]] [--json PATH]
+        [--sample CAPTURE] [--eyes FOLDER [--facekit FOLDER]] [--json PATH]
 
-FOLDER holds captures with a truth, as research/benchmarks/state.py reads them; --sample is what `make demo` leaves;
---eyes those of research/benchmarks/eye_captures.py. FOLDER/answers keeps the answers on each capture (a minute or two),
-whatever code gave them: delete it to ask anew. An error is the deviation, in natural log, of the picture less an answer
-from the true albedo, over bare facial skin in all frames, after one gain per channel and capture."""
-
-from __future__ import annotations
+FOLDER holds captures with a truth, as research/benchmarks/delighting/state.py reads them; --sample is the capture of
+`make demo`, --eyes the folder of research/benchmarks/captures/eye_captures.py. The weight of the fitted light beside
+the frames' own (core/stages/delight/second_opinion.py) is chosen by leaving one person out. FOLDER/answers keeps the
+answers on each capture (a minute or two), whatever code gave them: delete it to ask anew. An error is the deviation, in
+natural log, of the picture less an answer from the true albedo, over bare facial skin in all frames, after one gain per
+channel and capture.
+"""
 
 import argparse
 import sys
@@ -37,7 +36,8 @@ from core.stages.delight.second_opinion import FITTED, Weighing, weigh_in
 from ...people.lifelike.figure import make_figure
 from .. import figures
 from ..captures.eye_captures import EYES
-from ..captures.state_captures import SIZE, Filmed, find
+from ..captures.state_captures import SIZE, Filmed, add_captures, chosen_captures
+from ..figures import SAMPLE
 from ..measures.references import TRUE
 
 COMMAND = (
@@ -45,7 +45,6 @@ COMMAND = (
     "--json research/records/delight_answers.json"
 )
 SHARES, DOUBTS = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0), (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0)
-SAMPLE = figures.ROOT / "research" / "people" / "sample"
 GRID = tuple(Weighing(share, doubt) for share, doubt in product(SHARES, DOUBTS))
 BARE = 0.5  # share of bare skin in a cell from which it counts, as in second_opinion.weigh_in
 DARKEST = 2e-3
@@ -58,15 +57,17 @@ ROWS = {
     "with_fitted": "evened out and fitted light",
     "together": "put together",
 }
-"""What is told apart, and its heading."""
+"""Columns of the table, and their headings."""
 ANSWERS = ("true", "alone", "frames", "fitted", "together")
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A capture's answers on its cells of bare skin whose albedo is known, in natural log [N, 3] less their mean: the
-    true light, and that of the network for each frame, of the same evened out over the head, of the fitted light, and
-    of all that the delighter puts together, hues of light taken out as well."""
+    """A capture's answers on its cells of bare skin with a known albedo, natural log [N, 3] less their mean.
+
+    true: the true light; alone: the network's for each frame; frames: the same evened out over the head; fitted: the
+    fitted light; together: all that the delighter combines, with hues of light taken out.
+    """
 
     person: str
     true: np.ndarray
@@ -81,24 +82,20 @@ class Judged:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--truths", type=Path, help="where NAME/ with the truth lies, if not in FOLDER")
-    parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
-    parser.add_argument("--sample", type=Path, help="the sample's capture")
-    parser.add_argument("--eyes", type=Path, help="what research/benchmarks/eye_captures.py made")
+    parser = figures.command_line(__doc__, "delight_answers")
+    add_captures(parser)
+    parser.add_argument("--sample", type=Path, help="the sample's capture, as `make demo` leaves it")
+    parser.add_argument("--eyes", type=Path, help="the folder of research/benchmarks/captures/eye_captures.py")
     parser.add_argument("--facekit", type=Path, help="of --eyes, as it was given there")
-    parser.add_argument("--json", type=Path, help="where the figures go")
-    asked = parser.parse_args()
-    work = asked.folder.resolve() / "answers"
-    judged, known = {}, known_captures(asked)
-    if len({person for _, person, _, _ in known}) < 2:
+    options = parser.parse_args()
+    work, judged, captures = options.folder.resolve() / "answers", {}, known_captures(options)
+    if len({person for _, person, _, _ in captures}) < 2:
         parser.error(
-            f"The captures in {asked.folder} that have a texture and a known albedo show fewer than two "
-            "people, and each person is judged by what the others choose. `python -m research.benchmarks.state FOLDER "
+            f"The captures in {options.folder} that have a texture and a known albedo show fewer than two people, and "
+            "each person is judged by what the others choose. `python -m research.benchmarks.delighting.state FOLDER "
             "--run` makes textures; --sample and --eyes add people."
         )
-    for name, person, capture, truth in known:
+    for name, person, capture, truth in captures:
         kept = work / f"{name}.npz"
         if not kept.is_file():
             keep_answers(kept, capture, *truth())
@@ -107,37 +104,26 @@ def main() -> int:
         print(f"{name}: read", file=sys.stderr, flush=True)
     rows, chosen = score(judged)
     print(table(rows), "", choices(chosen), sep="\n")
-    if asked.json:
-        figures.write_record(
-            asked.json, "delight_answers", COMMAND, {"rows": rows, "chosen": chosen, "over_people": over_people(rows)}
-        )
+    found = {"rows": rows, "chosen": chosen, "over_people": over_people(rows)}
+    figures.write_record(options.json, "delight_answers", COMMAND, found)
     return 0
 
 
-def known_captures(asked: argparse.Namespace) -> list[tuple[str, str, Capture, Callable]]:
-    """Name, person, capture, and what reads its true albedo, linear [S, S, 3], with where it is known, bool [SIZE,
-    SIZE], both in the head's UVs."""
-    folder = asked.folder.resolve()
-    filmed = [
-        each
-        for each in find(folder, (asked.truths or folder).resolve(), folder / "state")
-        if each.name.startswith(tuple(asked.only))
-    ]
-    if asked.sample:
-        filmed.append(Filmed("sample", "sample", Capture(asked.sample.resolve()), SAMPLE, folder / "state"))
+def known_captures(options: argparse.Namespace) -> list[tuple[str, str, Capture, Callable]]:
+    """Return name, person, capture, and the function that reads its truth.
+
+    The truth is the albedo, linear [S, S, 3], and where it is known, bool [SIZE, SIZE], both in the head's UVs.
+    """
+    filmed = chosen_captures(options)
+    if options.sample:
+        work = options.folder.resolve() / "state"
+        filmed.append(Filmed("sample", "sample", Capture(options.sample.resolve()), SAMPLE, work))
     captures = [
         (each.name, each.person, each.capture, lambda each=each: (each.answer(TRUE), each.where)) for each in filmed
     ]
-    if asked.eyes:
-        captures += [
-            (
-                str(seed),
-                str(seed),
-                Capture(asked.eyes.resolve() / f"{seed}.wildcap"),
-                lambda seed=seed: _bare_truth(seed, asked.facekit),
-            )
-            for seed in EYES
-        ]
+    for seed in EYES if options.eyes else ():
+        capture = Capture(options.eyes.resolve() / f"{seed}.wildcap")
+        captures.append((str(seed), str(seed), capture, lambda seed=seed: _bare_truth(seed, options.facekit)))
     return captures
 
 
@@ -148,14 +134,9 @@ def _bare_truth(seed: int, facekit: Path | None) -> tuple[np.ndarray, np.ndarray
 
 
 def keep_answers(path: Path, capture: Capture, albedo: np.ndarray, known: np.ndarray) -> None:
-    """Asks the delighter and keeps its answers where the albedo is known.
+    """Ask the delighter, and keep its answers in cells of bare skin where the albedo is known.
 
-    Parameters
-    ----------
-    path : of the .npz: per answer the light, natural log [N, 3] less its mean, in cells of bare skin
-    capture : with cameras and a head
-    albedo : the truth, linear [S, S, 3], in the head's UVs, of any size
-    known : bool [SIZE, SIZE], where that is one
+    albedo: linear [S, S, 3], in the head's UVs; known: bool [SIZE, SIZE].
     """
     answers = ask(capture, Settings(device="cpu"), Reporter("delight", emit=lambda message: None))
     albedo = np.log(np.maximum(images.resize(np.ascontiguousarray(albedo, np.float32), SIZE, SIZE), DARKEST))
@@ -166,9 +147,9 @@ def keep_answers(path: Path, capture: Capture, albedo: np.ndarray, known: np.nda
         answers.looks, evened, answers.fitted, put_together(answers), answers.skins, strict=True
     ):
         uv = interpolate(mesh.uvs, mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
-        seen = sample(maps, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * SIZE).reshape(*look.face.shape, 4)
-        where = (look.face >= 0) & (skin > BARE) & (seen[..., 3] > 0.99)
-        lights = look.log - seen[..., :3], look.shading, even.shading, fitted, final.shading
+        shown = sample(maps, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * SIZE).reshape(*look.face.shape, 4)
+        where = (look.face >= 0) & (skin > BARE) & (shown[..., 3] > 0.99)
+        lights = look.log - shown[..., :3], look.shading, even.shading, fitted, final.shading
         for key, light in zip(ANSWERS, lights, strict=True):
             cells[key].append(light[where])
     joined = {key: np.concatenate(parts) for key, parts in cells.items()}
@@ -179,14 +160,14 @@ def keep_answers(path: Path, capture: Capture, albedo: np.ndarray, known: np.nda
 
 
 def weighed(light: np.ndarray, answer: np.ndarray, weighing: Weighing) -> np.ndarray:
-    """What `second_opinion.weigh_in` makes of two answers [N, 3] on bare skin."""
+    """Return `second_opinion.weigh_in` of two answers [N, 3] on bare skin."""
     skin, face = np.ones((1, len(light))), np.zeros((1, len(light)), int)
     look = ShadingEstimate((0, 0, 1), light[None], skin, light[None], face)
     return weigh_in([look], [answer[None]], [skin], weighing)[0].shading[0]
 
 
 def score(judged: dict[str, Judged]) -> tuple[dict, dict]:
-    """The errors of each capture by ROWS, and what `choose` says of the answer that is weighed in."""
+    """Return the errors of each capture by ROWS, and `choose` for the fitted light."""
     rows = {
         name: {
             "person": each.person,
@@ -200,8 +181,10 @@ def score(judged: dict[str, Judged]) -> tuple[dict, dict]:
 
 
 def choose(judged: dict[str, Judged]) -> dict:
-    """Which Weighing of GRID is best for the fitted light beside the frames' own answers, over people, and with each
-    person left out of the choice. People count alike, by ratios: their mean is the geometric one."""
+    """Choose the best Weighing of GRID for the fitted light, over all people and with each person left out.
+
+    People count alike, by ratios: their mean is the geometric one.
+    """
     errors = {
         weighing: {name: each.error(weighed(each.frames, each.fitted, weighing)) for name, each in judged.items()}
         for weighing in {*GRID, FITTED}
@@ -233,7 +216,7 @@ def choose(judged: dict[str, Judged]) -> dict:
 
 
 def over_people(rows: dict[str, dict]) -> dict[str, float]:
-    """The geometric mean over people of each error of ROWS; a person's is the mean of its captures."""
+    """Return the geometric mean over people of each error of ROWS; a person's is the mean of its captures."""
     persons = dict.fromkeys(row["person"] for row in rows.values())
     of_person = {
         key: [np.mean([row[key] for row in rows.values() if row["person"] == person]) for person in persons]
@@ -243,7 +226,7 @@ def over_people(rows: dict[str, dict]) -> dict[str, float]:
 
 
 def table(rows: dict[str, dict]) -> str:
-    """The errors in Markdown, and their geometric mean over people."""
+    """Return Markdown of the errors, and of their geometric mean over people."""
     means = over_people(rows)
     return figures.markdown(
         ["capture", *ROWS.values()],
@@ -255,29 +238,14 @@ def table(rows: dict[str, dict]) -> str:
 
 
 def choices(chosen: dict[str, dict]) -> str:
-    """What was chosen, in Markdown."""
-    return figures.markdown(
-        [
-            "answer",
-            "best share",
-            "best doubt",
-            "without it",
-            "as shipped",
-            "best",
-            "chosen by the others",
-            "people who gain",
-        ],
-        [
-            [
-                ROWS[name],
-                f"{row['share']:.1f}",
-                f"{row['doubt']:.2f}",
-                *(f"{row[key]:.4f}" for key in ("without", "shipped", "best", "left_out")),
-                f"{row['people_better']} of {row['people']}",
-            ]
-            for name, row in chosen.items()
-        ],
-    )
+    """Return Markdown of the choice."""
+    head = ["answer", "best share", "best doubt", "without it", "as shipped", "best", "chosen by the others"]
+    lines = []
+    for name, row in chosen.items():
+        errors = (f"{row[key]:.4f}" for key in ("without", "shipped", "best", "left_out"))
+        better = f"{row['people_better']} of {row['people']}"
+        lines.append([ROWS[name], f"{row['share']:.1f}", f"{row['doubt']:.2f}", *errors, better])
+    return figures.markdown([*head, "people who gain"], lines)
 
 
 if __name__ == "__main__":

@@ -1,12 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What research/benchmarks/delighting/delight.py measures of a delit picture, and the tables and sheets it makes of
-many.
+"""Figures of a delit picture, and the tables and sheets of many, for research/benchmarks/delighting/delight.py.
 
 All figures are those of research/benchmarks/measures/pictures.py after one gain per channel in linear light, so that
-neither the tone nor the light's colour counts."""
-
-from __future__ import annotations
+neither the tone nor the light's colour counts.
+"""
 
 import math
 
@@ -16,7 +14,7 @@ import numpy as np
 from core.imaging import images
 
 from ...people import pigment
-from ..figures import markdown
+from ..figures import markdown, number
 from ..maps.ablation_measures import feature_distance
 from ..maps.albedo_score import AlbedoTruth
 from ..measures.pictures import detail, differences, edge_bands, face_box, log_green, shadow_step, with_gain
@@ -59,8 +57,7 @@ def score_picture(
 
 
 def stepping(log_shading: np.ndarray, mask: np.ndarray, shadow: np.ndarray) -> np.ndarray:
-    """Return where along the shadow's edge the true light [H, W] (natural log) really steps, by LEAST_STEP or more:
-    bool [H, W]."""
+    """Return the pixels at the shadow's edge where the true log light [H, W] steps by LEAST_STEP, bool [H, W]."""
     means, near = [], np.ones(mask.shape, bool)
     for band in edge_bands(shadow):
         weight = (band & mask).astype(np.float32)
@@ -71,7 +68,7 @@ def stepping(log_shading: np.ndarray, mask: np.ndarray, shadow: np.ndarray) -> n
 
 
 def flat_tone(true: AlbedoTruth) -> np.ndarray:
-    """sRGB [3] of the linear mean of the true albedo over the facial skin."""
+    """Return the linear mean of the true albedo over the facial skin, as sRGB [3]."""
     return images.linear_to_srgb(images.srgb_to_linear(true.albedo[true.face]).mean(0))
 
 
@@ -81,17 +78,8 @@ def tone_group(srgb: np.ndarray) -> str:
     return next(name for name, above in TONES if angle > above or name == TONES[-1][0])
 
 
-def mean_of(scores: list[dict[str, float]]) -> dict[str, float | None]:
-    """Return the mean of each figure over the pictures that have it."""
-    return {
-        name: float(np.mean(known)) if (known := [s[name] for s in scores if not math.isnan(s[name])]) else None
-        for name in FIGURES
-    }
-
-
 def table(results: dict[str, dict]) -> str:
-    """Markdown of set -> row -> {pictures, figures, groups}: a line per row, then a line per row for each group (person
-    or skin tone) of several."""
+    """Return Markdown of set -> row -> {pictures, figures, groups}: a line per row, then one per row and group."""
     lines = []
     for name, rows in results.items():
         lines += [
@@ -114,8 +102,7 @@ def table(results: dict[str, dict]) -> str:
 
 
 def shortfalls(results: dict[str, dict], ours: str = "network") -> list[str]:
-    """Return where rows whose name begins with `ours` are no better than a RIVALS row of the same set, or of the same
-    group in it; detail is not asked for."""
+    """Find where rows named `ours...` are no better than a RIVALS row of the same set or group, detail apart."""
     found = []
     for name, rows in results.items():
         done = {
@@ -157,9 +144,4 @@ def sheet(photographs: list[list[np.ndarray]], side: int = 192) -> np.ndarray:
 
 def _line(name: str, row: str, found: dict) -> list:
     digits, figures = {"psnr": 2, "detail": 2, "shadow_step": 2}, found["figures"]
-    return [
-        name,
-        row,
-        found["pictures"],
-        *(None if figures[f] is None else f"{figures[f]:.{digits.get(f, 3)}f}" for f in FIGURES),
-    ]
+    return [name, row, found["pictures"], *(number(figures[f], digits.get(f, 3)) for f in FIGURES)]

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Synthetic portraits with their truth for research/benchmarks/delighting/delight.py: subjects of all skin tones that
-no training sees, each under several lights."""
-
-from __future__ import annotations
+"""Synthetic portraits with their truth, of all skin tones under several lights, that no training sees."""
 
 import sys
 from functools import cache, lru_cache
@@ -31,9 +28,7 @@ PICTURES = ("srgb", "albedo", "skin", "shadow")
 
 
 def make_portraits(work: Path, subjects: int = 6, lights: int = 2, every: int = 1) -> Photographs:
-    """Portraits of synthetic subjects of each group of skin tone.
-
-    work: folder that keeps what was made; every: every n-th picture of a group is taken."""
+    """Return portraits of synthetic subjects of each group of skin tone, every n-th picture of a group."""
     found = []
     for group, seeds in subjects_by_tone(subjects).items():
         taken = [(seed, light) for seed in seeds for light in range(lights)][::every]
@@ -43,7 +38,7 @@ def make_portraits(work: Path, subjects: int = 6, lights: int = 2, every: int = 
 
 @cache
 def subjects_by_tone(count: int) -> dict[str, list[int]]:
-    """Group -> the seeds of its first subjects, by the colour that their melanin and blood give."""
+    """Return group -> seeds of its first subjects, by the colour of their melanin and blood."""
     seeds: dict[str, list[int]] = {name: [] for name, _ in TONES}
     seed = FIRST_SEED
     while min(map(len, seeds.values())) < count:

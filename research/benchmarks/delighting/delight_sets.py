@@ -1,12 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What research/benchmarks/delighting/delight.py measures on: photographs with a known albedo, single ones and those of
-a registered capture."""
+"""Photographs with a known albedo for research/benchmarks/delighting/delight.py: single ones and captures."""
 
-from __future__ import annotations
-
-import subprocess
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,13 +14,16 @@ from core.geometry.views import read_views
 from core.imaging import images
 
 from ..captures.continued import begin_at_delight
+from ..figures import run_python
 from ..maps.albedo_score import AlbedoTruth, read_truth
 
 
 @dataclass(frozen=True)
 class Photograph:
-    """sRGB [H, W, 3] under some light, with its truth; group: what it is also averaged over; frame: its file's name
-    where it belongs to a capture."""
+    """A photograph, sRGB [H, W, 3], with its truth.
+
+    group: a further mean is taken over it; frame: the file's name if it belongs to a capture.
+    """
 
     name: str
     srgb: np.ndarray
@@ -43,10 +41,10 @@ class Photographs:
 
 
 def light_stage(folder: Path, every: int = 1) -> Photographs:
-    """align_image/PERSON/CAM/NNN.png with align_diffuse/PERSON_CAM.png and align_mask_face/PERSON_CAM.png; every n-th
-    light of each.
+    """Read a light stage's photographs, every n-th light of each camera.
 
-    Raises Problem where a picture's truth is missing, or there is no picture at all.
+    Files: align_image/PERSON/CAM/NNN.png, align_diffuse/PERSON_CAM.png, align_mask_face/PERSON_CAM.png. Raises Problem
+    if a picture lacks its truth, or there is none.
     """
     found = []
     for camera in sorted(path for path in folder.glob("align_image/*/*") if path.is_dir()):
@@ -79,10 +77,10 @@ def select_true_frames(truth: Path, capture: Capture, work: Path, every: int = 1
     if not capture.head.is_file():
         raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
     copy = begin_at_delight(capture, work / "copy.wildcap")
-    known = {true.frame: true for true in read_truth(truth)}
+    truths = {true.frame: true for true in read_truth(truth)}
     listed = read_frames(copy)
     registered = {view.name: view for view in read_views(copy)}
-    having = [frame for frame in listed.records if frame.video_frame in known and frame.name in registered]
+    having = [frame for frame in listed.records if frame.video_frame in truths and frame.name in registered]
     if not having:
         raise Problem(
             f"No registered frame of {capture.root} has a true albedo in {truth}.",
@@ -93,7 +91,7 @@ def select_true_frames(truth: Path, capture: Capture, work: Path, every: int = 1
     write_frames(copy.frames, replace(listed, records=chosen))
     found = []
     for frame in having[::every]:
-        true = known[frame.video_frame]
+        true = truths[frame.video_frame]
         srgb = images.read_srgb(registered[frame.name].path)
         if srgb.shape != true.albedo.shape:
             srgb = images.resize(srgb, true.albedo.shape[1], true.albedo.shape[0])
@@ -102,20 +100,10 @@ def select_true_frames(truth: Path, capture: Capture, work: Path, every: int = 1
 
 
 def registered(truth: Path, work: Path) -> Capture:
-    """Return the capture of `truth`/capture.mp4 in the folder `work`, run until its head is registered; kept there for
-    the next time."""
+    """Return the capture of `truth`/capture.mp4, run once in the folder `work` until its head is registered."""
     capture = Capture(work / f"{truth.name}.wildcap")
     if not capture.head.is_file():
-        command = [
-            sys.executable,
-            "-m",
-            "core",
-            "run",
-            str(truth / "capture.mp4"),
-            str(capture.root),
-            "--until",
-            "registration",
-        ]
-        if subprocess.run(command, stdout=sys.stderr, check=False).returncode != 0:
+        # standard output is the benchmark's own
+        if run_python("core", "run", truth / "capture.mp4", capture.root, "--until", "registration", quiet=True):
             raise Problem(f"{truth / 'capture.mp4'} could not be registered.", f"Look at {capture.report}.")
     return capture

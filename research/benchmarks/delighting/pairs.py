@@ -1,13 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pairs of synthetic portraits that differ in the pigment alone, or in the light alone: what the slopes of
-research/benchmarks/measures/slopes.py are taken on.
+"""Pairs of synthetic portraits that differ in the pigment alone, or in the light alone, for measures/slopes.py.
 
 The second pigment is the first times blotches of several sizes, from a mole's to a cheek's, unlike any skin: what tells
 pigment from light may not be that it knows faces. Subjects are those of
-research/benchmarks/delighting/delight_portraits.py, which no training sees."""
-
-from __future__ import annotations
+research/benchmarks/delighting/delight_portraits.py, which no training sees.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -31,8 +29,10 @@ LIT = 0.01, 0.95
 
 @dataclass(frozen=True)
 class Pair:
-    """Two portraits, sRGB [S, S, 3], and their true albedos, linear [S, S, 3]; where bool [S, S]: facial skin that both
-    show neither black nor clipped. kind: what differs, "pigment" or "light"."""
+    """Two portraits, sRGB [S, S, 3], with their true linear albedos [S, S, 3].
+
+    kind: the difference, "pigment" or "light"; where: bool [S, S], facial skin neither black nor clipped in both.
+    """
 
     name: str
     kind: str
@@ -43,7 +43,7 @@ class Pair:
 
 
 def pairs(subjects: dict[str, list[int]], size: int = 384) -> Iterator[Pair]:
-    """One pair of each kind per subject; subjects: group -> seeds."""
+    """Yield one pair of each kind per subject; subjects: group -> seeds."""
     for group, seeds in subjects.items():
         for seed in seeds:
             stage, sight = portrait_parts(seed, size)
@@ -57,7 +57,7 @@ def pairs(subjects: dict[str, list[int]], size: int = 384) -> Iterator[Pair]:
 
 
 def blotches(sight: Sight, rng: np.random.Generator) -> np.ndarray:
-    """Factors [P, 3] about 1 at the pixels of a sight: log-normal, of all SCALES."""
+    """Return log-normal factors [P, 3] about 1 of all SCALES at the pixels of a sight."""
     total = np.zeros((sight.size, sight.size, 3), np.float32)
     for scale in SCALES:
         for channels, deviation in ((1, DEVIATION), (3, 0.1 * DEVIATION)):

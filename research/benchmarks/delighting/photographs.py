@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a delighter of single photographs keeps the face and takes the light: features kept, agreement across lights,
-and the two slopes.
+"""Measure how far a delighter of single photographs keeps the face and takes the light.
 
     python -m research.benchmarks.delighting.photographs [--data DIR] [--delighter NAME] [--weights FILE] [--sets NAME
         ...] [--subjects N]
@@ -10,11 +9,9 @@ and the two slopes.
 Sets: faceolat (two people under twelve lights each, with their albedo and landmarks.json), lamps (DIR/near_ps_human1: a
 man with brows and a beard under seven lamps, ambient light subtracted; the merge of what each lamp lights stands for
 the truth), pairs (research/benchmarks/delighting/pairs.py, --subjects of each group of skin tone). Rows: the four
-references of research/benchmarks/measures/references.py, and the delighter."""
+references of research/benchmarks/measures/references.py, and the delighter.
+"""
 
-from __future__ import annotations
-
-import argparse
 import importlib
 import json
 import sys
@@ -34,6 +31,7 @@ from core.settings.settings import Settings
 from core.stages import delight
 
 from .. import figures
+from ..figures import SHARED
 from ..measures.agreement import disagreement
 from ..measures.features_kept import contrast_kept, contrasts, joint
 from ..measures.pictures import detail, log_green
@@ -44,7 +42,6 @@ from ..measures.tone import psnr_after_gain, to_decibels
 from .delight_portraits import subjects_by_tone
 from .pairs import pairs
 
-SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
 COMMAND = "python -m research.benchmarks.delighting.photographs --json research/records/photographs.json"
 LIT = 0.05
 """Share of a lit picture's 98th percentile above which a pixel is lit by its lamp."""
@@ -66,22 +63,15 @@ TITLES = {
     "lamps": "A bearded man under seven lamps",
     "pairs": "Pairs that differ in the pigment alone, or in the light alone",
 }
-WORDS = (
-    "PSNR after one gain per channel, and *detail*, the correlation with the truth's log green between 1 and 3 "
-    "px. *Brows, eyes, lips, chin*: share of "
-    "the truth's contrast that is kept, the median over the lights; mean abs(1 - kept) of brows and eyes, each "
-    "picture apart; the deviation of kept "
-    "between the lights over the untouched photographs'. *Agreement*: PSNR of the mean squared difference between "
-    "the answers to two lights, each pair "
-    "at the truth's tone. *Slopes*: how far the answer follows a change of the light alone, and of the pigment "
-    "alone. ± is the spread over people, with pairs over groups of skin tone."
-)
 
 
 @dataclass(frozen=True)
 class LightSeries:
-    """A person under several lights, the head held still. srgb: the pictures [H, W, 3]; albedo: the truth, linear [H,
-    W, 3]; landmarks [468, 2] in pixels; face bool [H, W]; lit: per picture the pixels bool [H, W] that count."""
+    """A still person under several lights.
+
+    srgb: pictures [H, W, 3]; albedo: the truth, linear [H, W, 3]; landmarks [468, 2] in pixels; face: bool [H, W]; lit:
+    per picture the pixels that count, bool [H, W].
+    """
 
     name: str
     srgb: list[np.ndarray]
@@ -96,39 +86,30 @@ class LightSeries:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "photographs")
     parser.add_argument("--data", type=Path, default=SHARED)
-    parser.add_argument(
-        "--delighter", choices=[name for name in delight.PHOTOGRAPHERS if name != "none"], default="network"
-    )
-    parser.add_argument(
-        "--weights",
-        type=Path,
-        help="weights of our network, with their card beside them, instead of those that are shipped",
-    )
+    rivals = [name for name in delight.PHOTOGRAPHERS if name != "none"]
+    parser.add_argument("--delighter", choices=rivals, default="network")
+    parser.add_argument("--weights", type=Path, help="other weights of our network, with their card beside them")
     parser.add_argument("--sets", nargs="+", choices=TITLES, default=list(TITLES))
     parser.add_argument("--subjects", type=int, default=2, help="of each group of skin tone")
-    parser.add_argument("--json", type=Path, help="where the record goes, research/records/photographs.json")
     options = parser.parse_args()
     if options.weights:
         importlib.import_module("core.stages.delight.network").WEIGHTS = options.weights
-    text, record = [("", WORDS)], {}
+    record = {}
     for name in options.sets:
         try:
-            scores = (
-                of_pairs(options.subjects, options.delighter)
-                if name == "pairs"
-                else of_sitters(SITTERS[name](options.data), options.delighter)
-            )
+            if name == "pairs":
+                scores = of_pairs(options.subjects, options.delighter)
+            else:
+                scores = of_sitters(SITTERS[name](options.data), options.delighter)
         except Problem as problem:
-            text.append((TITLES[name], f"Not measured: {problem.problem} {problem.remedy}"))
+            print(f"{TITLES[name]}\n\nNot measured: {problem.problem} {problem.remedy}\n")
             continue
         found = summarise(scores, COLUMNS)
-        text.append((TITLES[name], format_table(found, COLUMNS, "answer")))
+        print(f"{TITLES[name]}\n\n{format_table(found, COLUMNS, 'answer')}\n")
         record[name] = to_record(found, scores)
-    print("\n\n".join(f"{heading}\n\n{body}" for heading, body in text))
-    if options.json:
-        figures.write_record(options.json, "photographs", COMMAND, record, keep=True)
+    figures.write_record(options.json, "photographs", COMMAND, record, keep=True)
     return 0
 
 
@@ -136,7 +117,7 @@ def answer_photograph(srgb: np.ndarray, albedo: np.ndarray, lit: np.ndarray, del
     """Return all answers to one photograph. A picture that the delighter refuses is taken as it is, as an artist would.
 
     srgb: [H, W, 3]; albedo: [H, W, 3], linear, the truth; lit: bool [H, W], the pixels of the face that show
-    something. Returns Answer -> linear albedo [H, W, 3]."""
+    something. Returns answer -> linear albedo [H, W, 3]."""
     linear = images.srgb_to_linear(srgb)
     try:
         answer = delight.PHOTOGRAPHERS[delighter](srgb, Settings().delight)[0]
@@ -154,7 +135,7 @@ def answer_photograph(srgb: np.ndarray, albedo: np.ndarray, lit: np.ndarray, del
 
 
 def of_sitters(sitters: Iterator[LightSeries], delighter: str) -> Scores:
-    """Answer -> person -> figures of COLUMNS."""
+    """Return answer -> person -> figures of COLUMNS."""
     scores: Scores = {}
     for sitter in sitters:
         given = [
@@ -170,12 +151,13 @@ def of_sitter(sitter: LightSeries, answers: list[np.ndarray]) -> dict[str, float
     """Return the figures of one answer to all of a sitter's pictures; answers linear [H, W, 3]."""
     true = images.linear_to_srgb(sitter.albedo)
     log_true, truths = log_green(true), [contrasts(true, sitter.landmarks, lit) for lit in sitter.lit]
-    shares, filmed = (
+    srgb, filmed = ([images.linear_to_srgb(np.clip(p, 0, 1)) for p in each] for each in (answers, sitter.linear))
+    shares, untouched = (
         [
-            contrast_kept(contrasts(images.linear_to_srgb(np.clip(picture, 0, 1)), sitter.landmarks, lit), truth)
+            contrast_kept(contrasts(picture, sitter.landmarks, lit), truth)
             for picture, lit, truth in zip(each, sitter.lit, truths, strict=True)
         ]
-        for each in (answers, sitter.linear)
+        for each in (srgb, filmed)
     )
     errors, slopes = [], []
     for i, j in combinations(range(len(answers)), 2):
@@ -183,31 +165,21 @@ def of_sitter(sitter: LightSeries, answers: list[np.ndarray]) -> dict[str, float
         if both.sum() > 1000:
             errors.append(disagreement([answers[i][both], answers[j][both]], sitter.albedo[both].mean(0)))
             slopes.append(slope((answers[i], answers[j]), (sitter.linear[i], sitter.linear[j]), both))
+    psnrs = [psnr_after_gain(a[lit], sitter.albedo[lit]) for a, lit in zip(answers, sitter.lit, strict=True)]
+    details = [detail(log_green(picture), log_true, lit) for picture, lit in zip(srgb, sitter.lit, strict=True)]
+    kept = {name: [one[name] for one in shares if name in one] for name in ("brows", "eyes", "lips", "chin")}
     return {
-        "psnr": float(
-            np.mean([psnr_after_gain(a[lit], sitter.albedo[lit]) for a, lit in zip(answers, sitter.lit, strict=True)])
-        ),
-        "detail": float(
-            np.mean(
-                [
-                    detail(log_green(images.linear_to_srgb(np.clip(a, 0, 1))), log_true, lit)
-                    for a, lit in zip(answers, sitter.lit, strict=True)
-                ]
-            )
-        ),
-        **{
-            f"kept_{name}": float(np.median([one[name] for one in shares if name in one]))
-            for name in ("brows", "eyes", "lips", "chin")
-            if any(name in one for one in shares)
-        },
-        **joint(shares, filmed),
+        "psnr": float(np.mean(psnrs)),
+        "detail": float(np.mean(details)),
+        **{f"kept_{name}": float(np.median(values)) for name, values in kept.items() if values},
+        **joint(shares, untouched),
         "agreement": to_decibels(float(np.mean(errors))) if errors else None,
         "light_slope": float(np.mean([s for s in slopes if s is not None])) if slopes else None,
     }
 
 
 def of_pairs(subjects: int, delighter: str) -> Scores:
-    """Answer -> group of skin tone -> the two slopes, means over the group."""
+    """Return answer -> group of skin tone -> the two slopes, means over the group."""
     found: dict[str, dict[str, dict[str, list[float]]]] = {}
     for pair in pairs(subjects_by_tone(subjects)):
         given = [
@@ -230,7 +202,7 @@ def of_pairs(subjects: int, delighter: str) -> Scores:
 
 
 def light_stage_sitters(data: Path) -> Iterator[LightSeries]:
-    """Return the people of DATA/faceolat. Raises Problem where it is not there."""
+    """Yield the people of DATA/faceolat. Raises Problem if it is not there."""
     folder = data / "faceolat"
     if not (folder / "landmarks.json").is_file():
         raise Problem(f"{folder} has no landmarks.json.", "Name the folder that holds faceolat with --data.")
@@ -249,8 +221,7 @@ def light_stage_sitters(data: Path) -> Iterator[LightSeries]:
 
 
 def lamp_sitters(data: Path) -> Iterator[LightSeries]:
-    """Return the man of DATA/near_ps_human1, brightened to a usual exposure. Raises Problem where he is not there or no
-    face is found."""
+    """Yield the man of DATA/near_ps_human1, brightened to a usual exposure. Raises Problem without a face."""
     folder = data / "near_ps_human1"
     paths = sorted(folder.glob("[0-9]*.png"))
     if not paths or not (folder / "ambient.png").is_file():

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The estimated skin tone of real people, with its deviation, and how far a white or black ground moves it.
+"""Estimate the skin tone of real people, with its deviation, and how far a white or black ground moves it.
 
     python -m research.benchmarks.delighting.real_tones DATA FOLDER [--only NAME ...] [--row after] [--json FILE]
 
@@ -11,11 +11,6 @@ photographed before a light ground; they are also cut out over white and over bl
 checkout of it, with its estimate_from_frames in the place of estimate_skin_tone.
 """
 
-from __future__ import annotations
-
-import argparse
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -31,9 +26,8 @@ from core.stages.solve.capture_evidence import read_evidence
 from core.stages.solve.population import to_lab
 from core.stages.solve.tone import TONE_SIDE_TEXELS, estimate_skin_tone
 
-from ..figures import ROOT, write_record
+from ..figures import SAMPLE, command_line, run_python, write_record
 
-SAMPLE = ROOT / "research" / "people" / "sample"
 LONDON = {
     "025": "black",
     "042": "black",
@@ -46,7 +40,7 @@ LONDON = {
     "003": "white",
     "004": "white",
 }
-"""The first people of each group in london_info.csv, women and men; the group as they named it themselves."""
+"""First people of each group in london_info.csv, women and men; the group as they named it themselves."""
 GROUNDS = {"white": 1.0, "black": 0.02}  # sRGB
 OLAT = {"049": "Cam06", "071": "Cam07"}
 OLAT_LIGHTS = ("000", "004", "008")
@@ -54,12 +48,11 @@ LISA = ("45cm", "60cm", "lisa1", "lisa3")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = command_line(__doc__, "real_tones")
     parser.add_argument("data", type=Path)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", help="cases whose names begin with one of these")
     parser.add_argument("--row", default="after")
-    parser.add_argument("--json", type=Path, help="where the figures go, such as research/records/real_tones.json")
     options = parser.parse_args()
     figures = {}
     for name, prepare in cases(options.data).items():
@@ -68,33 +61,13 @@ def main() -> None:
         capture = Capture(options.folder / f"{name}.wildcap")
         if not capture.shadow_mask_auto.is_file():
             source = options.folder / "sources" / name
-            subprocess.run(
-                [
-                    sys.executable,
-                    "-m",
-                    "core",
-                    "run",
-                    str(prepare(source)),
-                    str(capture.root),
-                    "--until",
-                    "shadow_mask",
-                    "--quality",
-                    "draft",
-                ],
-                cwd=ROOT,
-                check=True,
-                stdout=subprocess.DEVNULL,
-            )
+            words = ("core", "run", prepare(source), capture.root, "--until", "shadow_mask", "--quality", "draft")
+            if code := run_python(*words, quiet=True):
+                raise SystemExit(code)
         figures[name] = {options.row: estimate(capture)}
         print(name, *figures[name][options.row].values(), flush=True)
-    if options.json:
-        write_record(
-            options.json,
-            "real_tones",
-            "python -m research.benchmarks.delighting.real_tones DATA FOLDER",
-            figures,
-            keep=True,
-        )
+    command = "python -m research.benchmarks.delighting.real_tones DATA FOLDER"
+    write_record(options.json, "real_tones", command, figures, keep=True)
 
 
 def cases(data: Path) -> dict[str, Callable[[Path], Path]]:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How well the automatic shadow mask finds the true shadow inside the face:
+"""Measure how well the automatic shadow mask finds the true shadow inside the face.
 
     python -m research.benchmarks.delighting.shadow_mask [--seeds N ...] [--capture CAPTURE TRUTH] [--delighters NAME
         ...] [--work FOLDER]
@@ -11,9 +11,6 @@ Printed per mask: intersection over union, precision and recall over the facial 
 border at 3 texels of a 1024 map, and the processor's seconds that the stage shadow_mask took.
 """
 
-from __future__ import annotations
-
-import argparse
 import shutil
 import tempfile
 import time
@@ -29,7 +26,7 @@ from core.settings.settings import from_json
 
 from ..captures.continued import begin_at_delight, run_stages
 from ..captures.shadow_captures import KINDS, SIZE, lifted_truth, synthetic_capture
-from ..figures import write_record
+from ..figures import command_line, markdown, write_record
 
 HELD_OUT = (200, 201, 202, 203, 204, 205)
 NEAR = 3.0  # texels of a 1024 map
@@ -37,49 +34,36 @@ COLUMNS = ("true", "masked", "IoU", "precision", "recall", "border F", "CPU seco
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        prog="python -m research.benchmarks.delighting.shadow_mask",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = command_line(__doc__, "shadow_mask")
     parser.add_argument("--seeds", type=int, nargs="*", default=HELD_OUT)
     parser.add_argument("--capture", type=Path, nargs=2, action="append", default=[], metavar=("CAPTURE", "TRUTH"))
     parser.add_argument("--delighters", nargs="+", default=["shading", "none"])
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_shadow_masks")
-    parser.add_argument(
-        "--json",
-        type=Path,
-        help="where the figures go, such as research/records/shadow_mask.json; those of other rows stay",
-    )
     options = parser.parse_args()
-    found: dict[str, dict] = {}
-    print("| capture | delighter | " + " | ".join(COLUMNS) + " |\n| --- | --- |" + " --- |" * len(COLUMNS))
+    found = {}
     for delighter in options.delighters:
-        names = [f"synthetic {seed}, {KINDS[seed % len(KINDS)]}" for seed in options.seeds]
-        rows = [
-            _row(*_synthetic(seed, delighter, options.work), name, delighter)
-            for seed, name in zip(options.seeds, names, strict=True)
-        ]
-        found |= {f"{name}, {delighter}": _figures(name, delighter, row) for name, row in zip(names, rows, strict=True)}
-        if len(rows) > 1:
-            _print("mean of the synthetic", delighter, np.mean(rows, 0))
-    for capture, truth in options.capture:
-        delighter = _delighter_of(Capture(capture))
-        row = _row(*_filmed(capture, truth, options.work), capture.stem, delighter)
-        found[f"{capture.stem}, {delighter}"] = _figures(capture.stem, delighter, row)
-    if options.json:
-        write_record(
-            options.json,
-            "shadow_mask",
-            "python -m research.benchmarks.delighting.shadow_mask",
-            {"rows": found},
-            keep=True,
-        )
+        for seed in options.seeds:
+            name = f"synthetic {seed}, {KINDS[seed % len(KINDS)]}"
+            found[name, delighter] = judge(*_synthetic(seed, delighter, options.work), delighter)
+    for source, truth in options.capture:
+        delighter = str(Capture(source).read()["stages"]["delight"]["figures"]["delighter"])
+        found[source.stem, delighter] = judge(*_filmed(source, truth, options.work), delighter)
+    lines = [[*names, *(f"{value:.2f}" for value in row.values())] for names, row in found.items()]
+    print(markdown(["capture", "delighter", *COLUMNS], lines))
+    rows = {
+        ", ".join(names): dict(zip(("capture", "delighter"), names, strict=True)) | row for names, row in found.items()
+    }
+    write_record(
+        options.json, "shadow_mask", "python -m research.benchmarks.delighting.shadow_mask", {"rows": rows}, True
+    )
 
 
 def scores(proposed: np.ndarray, true: np.ndarray, judged: np.ndarray) -> tuple[float, ...]:
-    """Shares of the judged texels that are in shadow and masked, intersection over union, precision, recall and the
-    F-score of the border at NEAR texels of a 1024 map, of masks bool [S, S] over texels bool [S, S]."""
+    """Compare masks, bool [S, S], over the judged texels, bool [S, S].
+
+    Returns the shares in shadow and masked, intersection over union, precision, recall, and the F-score of the border
+    at NEAR texels of a 1024 map.
+    """
     both = (proposed & true)[judged].sum()
     reach = NEAR * len(proposed) / 1024
     borders = [
@@ -98,57 +82,33 @@ def scores(proposed: np.ndarray, true: np.ndarray, judged: np.ndarray) -> tuple[
     )
 
 
-def _row(capture: Capture, true: np.ndarray, name: str, delighter: str) -> tuple[float, ...]:
+def judge(capture: Capture, true: np.ndarray, delighter: str) -> dict[str, float]:
+    """Propose a capture's mask, and return its figures by COLUMNS."""
     began = time.process_time()
     _run(capture, delighter, "shadow_mask")
     seconds = time.process_time() - began
     mask = images.resize(images.read_mask(capture.shadow_mask_auto), SIZE, SIZE)
     confidence = images.resize(images.read_data(capture.texture_confidence)[..., 0], SIZE, SIZE)
     skin = (template.mask("skin", SIZE) > 0.5) & (template.mask("face", SIZE) > 0.5)
-    found = (*scores(mask > 0.5, true, skin & (confidence > 0.1)), seconds)
-    _print(name, delighter, found)
-    return found
-
-
-def _figures(name: str, delighter: str, scores: tuple[float, ...]) -> dict:
-    return {
-        "capture": name,
-        "delighter": delighter,
-        **{column.lower().replace(" ", "_"): value for column, value in zip(COLUMNS, scores, strict=True)},
-    }
-
-
-def _print(name: str, delighter: str, scores) -> None:
-    print(
-        f"| {name} | {delighter} | " + " | ".join(f"{v:.2f}" for v in scores[:-1]) + f" | {scores[-1]:.1f} |",
-        flush=True,
-    )
+    values = (*scores(mask > 0.5, true, skin & (confidence > 0.1)), seconds)
+    return {column.lower().replace(" ", "_"): value for column, value in zip(COLUMNS, values, strict=True)}
 
 
 def _synthetic(seed: int, delighter: str, work: Path) -> tuple[Capture, np.ndarray]:
+    """Return a copy of a synthetic capture, delit and textured by today's code, and its true shadow."""
     capture, true = synthetic_capture(seed, KINDS[seed % len(KINDS)], work / f"{seed}.wildcap")
-    return _delit(capture, delighter, work / f"{seed}_{delighter}.wildcap"), true
+    copy = begin_at_delight(capture, work / f"{seed}_{delighter}.wildcap")
+    _run(copy, delighter, "delight", "texture")
+    return copy, true
 
 
 def _filmed(source: Path, truth: Path, work: Path) -> tuple[Capture, np.ndarray]:
-    """Return a copy of the capture up to its texture."""
+    """Return a copy of a capture up to its texture, and its true shadow."""
     copy = Capture(work / f"{source.stem}_copy.wildcap")
     shutil.rmtree(copy.root, ignore_errors=True)
-    shutil.copytree(
-        source, copy.root, ignore=shutil.ignore_patterns("maps*", "checkpoints", "delivery", "renders", "lock")
-    )
+    later = shutil.ignore_patterns("maps*", "checkpoints", "delivery", "renders", "lock")
+    shutil.copytree(source, copy.root, ignore=later)
     return copy, lifted_truth(copy, truth)
-
-
-def _delighter_of(capture: Capture) -> str:
-    return str(capture.read()["stages"]["delight"]["figures"]["delighter"])
-
-
-def _delit(capture: Capture, delighter: str, folder: Path) -> Capture:
-    """Return a copy of what the delighter needs, delit and textured by today's code."""
-    copy = begin_at_delight(capture, folder)
-    _run(copy, delighter, "delight", "texture")
-    return copy
 
 
 def _run(capture: Capture, delighter: str, *stages: str) -> None:

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How true the estimated skin tone is, for each of six groups of skin, under random lights, exposures and white
-balances:
+"""Measure the estimated skin tone of six groups of skin under random lights, exposures and white balances.
 
     python -m research.benchmarks.delighting.skin_tone [--each 6] [--capture CAPTURE TONE.txt ...]
 
@@ -11,9 +10,7 @@ root mean square error of L*, mean delta E 2000, the stated deviation of L*, and
 those. A capture is a finished one with the sRGB of its true tone in a text file.
 """
 
-from __future__ import annotations
-
-import argparse
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -34,20 +31,15 @@ from ...people.pigment import reflectance
 from ...people.sample import RESERVED
 from ...training.seeds import HELD_OUT_SEED
 from ...training.tones import PHONES, photographed, scenes_of
-from ..figures import write_record
+from ..figures import command_line, markdown, write_record
 
 MOST = 400  # subjects looked at until each group has enough
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = command_line(__doc__, "skin_tone")
     parser.add_argument("--each", type=int, default=6, help="subjects of each group, at least")
     parser.add_argument("--capture", nargs=2, action="append", default=[], metavar=("CAPTURE", "TONE"))
-    parser.add_argument(
-        "--json",
-        type=Path,
-        help="where the figures go, such as research/records/skin_tone.json; those of other captures stay",
-    )
     options = parser.parse_args()
     rows: dict[str, list] = {"scene": [], "measured": []}
     subjects = dict.fromkeys((name for _, name in TYPOLOGY_GROUPS), 0)
@@ -59,27 +51,23 @@ def main() -> None:
         scenes = scenes_of(seed)
         name = name_group(scenes[0].tone)
         subjects[name] += 1
-        for light, scene in enumerate(scenes):
-            for phone in range(PHONES):
-                look, card = photographed(scene, np.random.default_rng([seed, light, phone, 33]))
-                for row, tone in (
-                    ("scene", estimate_from_scene(look.best, SCENE)),
-                    ("measured", estimate_from_white(look.front, card)),
-                ):
-                    rows[row].append((name, *errors(tone, scene.tone)))
-    print_table(rows, subjects)
-    captures = {}
+        for (light, scene), phone in product(enumerate(scenes), range(PHONES)):
+            look, card = photographed(scene, np.random.default_rng([seed, light, phone, 33]))
+            rows["scene"].append((name, *errors(estimate_from_scene(look.best, SCENE), scene.tone)))
+            rows["measured"].append((name, *errors(estimate_from_white(look.front, card), scene.tone)))
+    groups, captures = summary(rows, subjects), {}
+    lines = [
+        [row, name, found["subjects"], *(f"{value:.2f}" for value in found[row].values())]
+        for row in rows
+        for name, found in groups.items()
+        if row in found
+    ]
+    print(markdown(["row", "group", "subjects", "L* mean", "L* rms", "delta E", "stated", "within two"], lines))
     for folder, truth in options.capture:
         tone = np.array([float(v) for v in Path(truth).read_text(encoding="ascii").split("#")[0].split(",")])
         captures[Path(folder).stem] = of_capture(Capture(folder), tone)
-    if options.json:
-        write_record(
-            options.json,
-            "skin_tone",
-            "python -m research.benchmarks.delighting.skin_tone --each 14 [--capture CAPTURE TONE.txt]",
-            {"groups": summary(rows, subjects), "captures": captures},
-            keep=True,
-        )
+    command = "python -m research.benchmarks.delighting.skin_tone --each 14 [--capture CAPTURE TONE.txt]"
+    write_record(options.json, "skin_tone", command, {"groups": groups, "captures": captures}, keep=True)
 
 
 def expected(seed: int) -> str:
@@ -90,14 +78,17 @@ def expected(seed: int) -> str:
 
 
 def errors(tone: SkinTone, truth: np.ndarray) -> tuple[float, float, float]:
-    """Signed error of L*, delta E 2000, and the stated deviation of L*."""
+    """Return the signed error of L*, delta E 2000, and the stated deviation of L*."""
     found, true = to_lab(np.array(tone.linear)), to_lab(truth)
     return float(found[0] - true[0]), float(deltaE_ciede2000(true, found)), tone.deviation
 
 
 def summary(rows: dict[str, list], subjects: dict[str, int]) -> dict[str, dict]:
-    """Group (and "all") -> subjects, and row -> mean signed and root mean square error of L*, mean delta E 2000, mean
-    stated deviation of L* and the share within two of those."""
+    """Return group (and "all") -> subjects, and row -> figures.
+
+    Figures: mean signed and root mean square error of L*, mean delta E 2000, mean stated deviation of L*, and the share
+    within two of those.
+    """
     found: dict[str, dict] = {}
     for name in (*subjects, "all"):
         of_group = {"subjects": subjects.get(name, sum(subjects.values()))}
@@ -116,24 +107,8 @@ def summary(rows: dict[str, list], subjects: dict[str, int]) -> dict[str, dict]:
     return found
 
 
-def print_table(rows: dict[str, list], subjects: dict[str, int]) -> None:
-    print(
-        f"{'row':9} {'group':13} {'subjects':>8} {'L* mean':>8} {'L* rms':>7} {'delta E':>8} {'stated':>7} "
-        f"{'in two':>7}"
-    )
-    groups = summary(rows, subjects)
-    for row in rows:
-        for name, of_group in groups.items():
-            if of := of_group.get(row):
-                print(
-                    f"{row:9} {name:13} {of_group['subjects']:8} {of['lightness']:+8.2f} {of['rms']:7.2f} "
-                    f"{of['delta_e']:8.2f} {of['stated']:7.2f} {of['within_two']:7.2f}"
-                )
-
-
 def of_capture(capture: Capture, srgb: np.ndarray) -> dict:
-    """Return the true L* of a finished capture, and the estimate's error of L*, delta E and stated deviation, which are
-    printed."""
+    """Print and return the true L* of a finished capture, and the errors of the estimate."""
     truth, head = images.srgb_to_linear(srgb), read_head(capture)
     evidence = read_evidence(capture, head, TONE_SIDE_TEXELS)
     tone = estimate_skin_tone(capture, head, Settings(), evidence, Reporter("skin_tone"))

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All measures of one capture, and of the captures of one person together, for
-research/benchmarks/delighting/state.py."""
-
-from __future__ import annotations
+"""All measures of one capture, and of one person's captures together."""
 
 from itertools import combinations
 
@@ -22,6 +19,7 @@ from ..measures.pictures import detail, differences, face_box, log_green, shadow
 from ..measures.references import NOTHING, TRUE, face_height
 from ..measures.shared_light import fit_light, log_ratio, without_light
 from ..measures.slopes import slope
+from ..measures.table import mean, mean_of
 from ..measures.tone import psnr_after_gain
 from .delight_measures import stepping
 
@@ -29,12 +27,13 @@ Figures = dict[str, float | None]
 
 
 def in_pictures(answers: dict[str, np.ndarray], looks: list[HeadInView]) -> dict[str, Figures]:
-    """Method -> PSNR, SSIM and FLIP after one gain per channel, detail, and what is left along the shadow's edge, means
-    over the frames with a truth. answers: linear maps [S, S, 3], among them the filmed one, which tells where the light
-    steps.
+    """Return method -> figures in the picture, means over the frames with a truth.
 
-    Pixels count where the truth has facial skin and the head its face: the strands of a full beard stand before the
-    neck, and no map on a head without strands can show them there.
+    PSNR, SSIM and FLIP are after one gain per channel. answers: linear maps [S, S, 3], with the filmed one, which tells
+    where the light steps.
+
+    Pixels count where the truth has facial skin and the head its face: a beard's strands stand before the neck, and no
+    map on a head without strands can show them there.
     """
     found: dict[str, list[Figures]] = {method: [] for method in answers}
     face = np.repeat(template.mask("face", SIZE)[..., None], 3, axis=-1)
@@ -66,8 +65,7 @@ def in_pictures(answers: dict[str, np.ndarray], looks: list[HeadInView]) -> dict
 
 
 def in_uv(filmed: Filmed, maps: dict[str, np.ndarray]) -> dict[str, Figures]:
-    """Method -> the measures of one capture in UV space: PSNR up to a light of its own and that light's deviation,
-    contrast kept, parts. maps: linear [SIZE, SIZE, 3], the true one among them."""
+    """Return method -> figures of one capture in UV space, from linear maps [SIZE, SIZE, 3] with the true one."""
     where, points = filmed.where, landmarks_in_uv()
     truth, normals = maps[TRUE], filmed.normals[where]
     true_contrasts = contrasts(images.linear_to_srgb(truth), points, where)
@@ -91,9 +89,10 @@ def in_uv(filmed: Filmed, maps: dict[str, np.ndarray]) -> dict[str, Figures]:
 def of_person(
     captures: list[Filmed], maps: list[dict[str, np.ndarray]]
 ) -> tuple[dict[str, Figures], dict[str, Figures]]:
-    """Method -> what only the captures of one person together tell: PSNR up to their shared light, that light,
-    agreement, how features vary between lights, and the slope by light; and method -> capture -> PSNR up to the shared
-    light. A method counts the captures that have its answer; what needs two captures is None with one."""
+    """Return method -> figures of a person's captures together, and method -> capture -> PSNR up to shared light.
+
+    A method counts the captures that have its answer; what needs two captures is None with one.
+    """
     found, each_alone = {}, {}
     for method in dict.fromkeys(name for answers in maps for name in answers):
         chosen = [i for i, each in enumerate(maps) if method in each]
@@ -110,7 +109,7 @@ def of_person(
         figures: Figures = {
             "light_shared": shared.deviation,
             "captures": len(chosen),
-            "psnr_shared": _mean(list(each_alone[method].values())),
+            "psnr_shared": mean(list(each_alone[method].values())),
         }
         everywhere = np.logical_and.reduce(places)
         if len(chosen) > 1 and everywhere.any():
@@ -121,22 +120,15 @@ def of_person(
             ]
             figures |= {
                 "agreement": agreement([maps[i][method][everywhere] for i in chosen], tone),
-                "light_slope": _mean(slopes),
+                "light_slope": mean(slopes),
             }
         figures |= joint(*([_kept(captures[i], maps[i], name) for i in chosen] for name in (method, NOTHING)))
         found[method] = figures
     return found, each_alone
 
 
-def mean_of(rows: list[Figures]) -> Figures:
-    """Return the mean of each figure over the rows that have it; None where none does."""
-    return {
-        name: _mean([row.get(name) for row in rows]) for name in dict.fromkeys(name for row in rows for name in row)
-    }
-
-
 def small(answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Maps at SIZE."""
+    """Return maps at SIZE."""
     return {
         method: images.resize(np.ascontiguousarray(answer, np.float32), SIZE, SIZE)
         for method, answer in answers.items()
@@ -153,8 +145,3 @@ def _kept(filmed: Filmed, maps: dict[str, np.ndarray], method: str) -> Figures:
 def _seen(look: HeadInView, answer: np.ndarray) -> np.ndarray:
     """Return a linear map as a look sees it, sRGB [H, W, 3]."""
     return images.linear_to_srgb(np.clip(look.picture(answer), 0, 1))
-
-
-def _mean(scores: list[float | None]) -> float | None:
-    known = [value for value in scores if value is not None and np.isfinite(value)]
-    return float(np.mean(known)) if known else None

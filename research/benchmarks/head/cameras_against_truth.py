@@ -8,8 +8,6 @@ film of a head that sways has the cameras with respect to the head there: what c
 lie from where they were filmed, face_off_px, after the similarity that makes them lie best in all frames.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path
@@ -38,7 +36,7 @@ FACE = np.array(
 
 
 def compare(capture: Capture, truth: Path) -> dict:
-    """Figures of a capture's cameras against a truth folder's."""
+    """Return the figures of a capture's cameras against a truth folder's."""
     record = json.loads((truth / "cameras.json").read_text(encoding="utf-8"))
     true = {camera["frame"]: np.array(camera["matrix_world"]) for camera in record["cameras"]}
     views, matrices = _paired(capture, true)
@@ -72,8 +70,10 @@ def compare(capture: Capture, truth: Path) -> dict:
 
 
 def place_truth(capture: Capture, truth: Path) -> tuple[tuple[float, np.ndarray, np.ndarray], np.ndarray]:
-    """scale, rotation [3, 3], translation [3] that take the truth's world, metres, to the capture's so that points of
-    the face lie where they were filmed, and by how many pixels they miss that in each frame [V]."""
+    """Return the similarity that takes the truth's world (m) to the capture's, and its error per frame [V] in px.
+
+    The similarity, (scale, rotation [3, 3], translation [3]), makes points of the face lie where they were filmed.
+    """
     record = json.loads((truth / "cameras.json").read_text(encoding="utf-8"))
     views, matrices = _paired(
         capture, {camera["frame"]: np.array(camera["matrix_world"]) for camera in record["cameras"]}
@@ -102,8 +102,7 @@ def place_truth(capture: Capture, truth: Path) -> tuple[tuple[float, np.ndarray,
 
 
 def similarity(source: np.ndarray, target: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """scale, rotation [3, 3], translation [3] that take source [N, 3] to target in the least-squares sense (Umeyama
-    1991)."""
+    """Return scale, rotation [3, 3], translation [3] that take source [N, 3] to target (Umeyama 1991)."""
     a, b = source - source.mean(0), target - target.mean(0)
     u, s, vt = np.linalg.svd(b.T @ a)
     sign = np.diag([1, 1, np.sign(np.linalg.det(u @ vt))])

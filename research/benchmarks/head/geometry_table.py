@@ -1,8 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What research.benchmarks.head.geometry found, as Markdown."""
-
-from __future__ import annotations
+"""Markdown of the figures of research.benchmarks.head.geometry."""
 
 from ..figures import markdown, number
 
@@ -16,8 +14,7 @@ ROWS = {
 
 
 def table(figures: dict[str, dict]) -> str:
-    """Return the tables of {capture: figures of geometry.measure_capture}; what was not measured is a dash or is
-    said."""
+    """Return the tables of {capture: figures of geometry.measure_capture}; a dash was not measured."""
     results = figures
     tables = [_cameras(results), _surfaces(results), _textures(results), _costs(results)]
     stopped = [
@@ -35,8 +32,7 @@ def table(figures: dict[str, dict]) -> str:
 
 
 def published(results: dict[str, dict]) -> dict[str, dict]:
-    """Return what of the results goes into the record: all but the stages' own figures that no table shows, and
-    pictures."""
+    """Return the results for the record, without pictures and figures of stages that no table shows."""
     return {
         name: {
             part: {**of, "own": _millimetres(of["own"])} if isinstance(of, dict) and "own" in of else of
@@ -56,103 +52,52 @@ def _cameras(results: dict) -> str:
     for name, figures in results.items():
         c = figures.get("cameras", {})
         t = c.get("against_truth", {})
-        rows.append(
-            [
-                name,
-                c.get("frames", "-"),
-                number(c.get("registered_percent"), 0, " %"),
-                number(c.get("reprojection_px"), 2, " px"),
-                number(t.get("centre_error_median_percent"), 3, " %"),
-                number(t.get("rotation_error_median_deg"), 2, "°"),
-                number(t.get("focal_px"), 0, f" px of {t['true_focal_px']:.0f}" if "true_focal_px" in t else ""),
-            ]
-        )
-    return markdown(
-        [
-            "cameras",
-            "frames",
-            "registered",
-            "reprojection",
-            "centres (median, of the distance)",
-            "rotations (median)",
-            "focal length",
-        ],
-        rows,
-    )
+        true_focal = f" px of {t['true_focal_px']:.0f}" if "true_focal_px" in t else ""
+        own = number(c.get("registered_percent"), 0, " %"), number(c.get("reprojection_px"), 2, " px")
+        centres = number(t.get("centre_error_median_percent"), 3, " %")
+        rotations, focal = number(t.get("rotation_error_median_deg"), 2, "°"), number(t.get("focal_px"), 0, true_focal)
+        rows.append([name, c.get("frames"), *own, centres, rotations, focal])
+    against = ("centres (median, of the distance)", "rotations (median)", "focal length")
+    return markdown(["cameras", "frames", "registered", "reprojection", *against], rows)
 
 
 def _surfaces(results: dict) -> str:
+    keys = [(kind, f"{share}_mm") for kind in ("by_cameras", "after_icp") for share in ("median", "p90", "p95")]
     rows = []
-    for name, figures in results.items():
-        for part in ("scan", "head"):
-            t = figures.get(part, {}).get("against_truth")
-            if t:
-                rows.append(
-                    [
-                        f"{name}: {part}",
-                        *(
-                            number(t.get(kind, {}).get(f"{share}_mm"), 2, " mm")
-                            for kind in ("by_cameras", "after_icp")
-                            for share in ("median", "p90", "p95")
-                        ),
-                    ]
-                )
-            else:
-                own = _millimetres(figures.get(part, {}).get("own", {}))
-                shown = "; ".join(f"{key.replace('_', ' ')} {value:.3g}" for key, value in own.items())
-                rows.append([f"{name}: {part}", shown or "-", *["no truth" if shown else "-"] * 5])
-    return markdown(
-        ["to the true surface, in the face", "median", "90 %", "95 %", "median after ICP", "90 %", "95 %"], rows
-    )
+    for name, part in ((name, part) for name in results for part in ("scan", "head")):
+        found = results[name].get(part, {})
+        if t := found.get("against_truth"):
+            cells = [number(t.get(kind, {}).get(key), 2, " mm") for kind, key in keys]
+        else:
+            own = _millimetres(found.get("own", {}))
+            shown = "; ".join(f"{key.replace('_', ' ')} {value:.3g}" for key, value in own.items())
+            cells = [shown or None, *["no truth" if shown else None] * 5]
+        rows.append([f"{name}: {part}", *cells])
+    head = ["to the true surface, in the face", "median", "90 %", "95 %", "median after ICP", "90 %", "95 %"]
+    return markdown(head, rows)
 
 
 def _textures(results: dict) -> str:
+    shown = ("ssim", "detail", "mole_contrast", "pore_contrast", "pore_correlation")
     rows = []
     for name, figures in results.items():
         alone = figures.get("texture", {}).get("alone", {})
         for row, label in (*ROWS.items(), ("leave_one_out", "aligned, frame left out")):
             f = alone.get(row)
             if f and "not_run" in f:
-                rows.append([f"{name}: {label}", f"not run: {f['not_run']}", *["-"] * 6])
+                rows.append([f"{name}: {label}", f"not run: {f['not_run']}", *[None] * 6])
             elif f:
-                rows.append(
-                    [
-                        f"{name}: {label}",
-                        number(f.get("psnr_after_gain" if row == "delit" else "psnr"), 2, " dB"),
-                        *(
-                            number(f.get(k), 3)
-                            for k in ("ssim", "detail", "mole_contrast", "pore_contrast", "pore_correlation")
-                        ),
-                        number(f.get("seconds"), 0, " s"),
-                    ]
-                )
-    return markdown(
-        [
-            "texture of the true albedo frames",
-            "PSNR",
-            "SSIM",
-            "detail",
-            "moles: contrast",
-            "pores: contrast",
-            "pores: correlation",
-            "seconds",
-        ],
-        rows,
-    )
+                psnr = number(f.get("psnr_after_gain" if row == "delit" else "psnr"), 2, " dB")
+                seconds = number(f.get("seconds"), 0, " s")
+                rows.append([f"{name}: {label}", psnr, *(number(f.get(key), 3) for key in shown), seconds])
+    fine = ("moles: contrast", "pores: contrast", "pores: correlation")
+    return markdown(["texture of the true albedo frames", "PSNR", "SSIM", "detail", *fine, "seconds"], rows)
 
 
 def _costs(results: dict) -> str:
-    names = list(dict.fromkeys(stage for figures in results.values() for stage in figures.get("stages", {})))
-    rows = [
-        [
-            stage,
-            *(
-                f"{c['seconds']:.0f} s, {c['peak_mb'] / 1000:.1f} GB"
-                if (c := figures.get("stages", {}).get(stage))
-                else "-"
-                for figures in results.values()
-            ),
-        ]
-        for stage in names
-    ]
+    stages = [figures.get("stages", {}) for figures in results.values()]
+    rows = []
+    for name in dict.fromkeys(name for costs in stages for name in costs):
+        found = [costs.get(name) for costs in stages]
+        rows.append([name, *(c and f"{c['seconds']:.0f} s, {c['peak_mb'] / 1000:.1f} GB" for c in found)])
     return markdown(["stage: seconds, peak memory", *results], rows)

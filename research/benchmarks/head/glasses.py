@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How surely glasses are told: on rendered people whom nothing was learnt from, with and without drawn glasses, and the
-false alarms on real people without.
+"""Measure how surely glasses are found on rendered people, and the false alarms on real people without.
 
     python -m research.benchmarks.head.glasses [DATA] [--work FOLDER] [--hdri FOLDER] [--json PATH]
 
@@ -9,9 +8,6 @@ DATA: the folder with photographs/, portraits/, faceolat/, near_ps_human1/, bust
 each of them is a capture, or several. FOLDER holds the figures' sights as `research.training glasses` keeps them.
 """
 
-from __future__ import annotations
-
-import argparse
 import json
 import tempfile
 from collections.abc import Iterator
@@ -31,8 +27,8 @@ from ...people.lifelike import glasses
 from ...training import glasses as training
 from .. import figures
 from ..captures.films import read_film
+from ..figures import SHARED
 
-SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
 COMMAND = "python -m research.benchmarks.head.glasses DATA --hdri DATA/hdri --json research/records/glasses.json"
 BARE, SEEN = 3, 4
 """Captures without glasses of each held-out figure, beside one with each kind of them; photographs of a capture."""
@@ -42,7 +38,7 @@ LONG_SIDE = 960
 
 
 def verdict(probabilities: list[float]) -> str:
-    """refused, warned or passed: what the stage frames does with a capture whose frames are so sure of glasses."""
+    """Return refused, warned or passed: the answer of the stage frames to such probabilities of glasses."""
     report = Reporter("frames")
     try:
         judge(probabilities, False, report)
@@ -52,7 +48,7 @@ def verdict(probabilities: list[float]) -> str:
 
 
 def look(srgb: np.ndarray) -> float:
-    """Return how surely a picture shows glasses; nan where no face is found or it is turned too far."""
+    """Return the sureness that a picture shows glasses; nan if no face is found or it is turned too far."""
     share = min(1.0, LONG_SIDE / max(srgb.shape[:2]))
     srgb = images.resize(srgb, round(srgb.shape[1] * share), round(srgb.shape[0] * share)) if share < 1 else srgb
     face = faces.detect(srgb)
@@ -60,22 +56,22 @@ def look(srgb: np.ndarray) -> float:
 
 
 def rendered(work: Path, hdri: Path | None) -> dict:
-    """Captures of the held-out figures, each all their views: what becomes of them, and single pictures, by kind."""
+    """Return the counts of the held-out figures' captures and pictures by kind of glasses."""
     people, panoramas = training.seeds(0)[1], read_panoramas(hdri)
     training.prepare(people, work, Reporter("glasses"))
-    told: dict[str, list] = {kind: [] for kind in (*glasses.KINDS, "none")}
+    captures_by_kind: dict[str, list] = {kind: [] for kind in (*glasses.KINDS, "none")}
     for person in people:
         for number, kind in enumerate((*glasses.KINDS, *["none"] * BARE)):
             rng = np.random.default_rng([3, person, number])
             sights = [training.read(work, person, view) for view in range(SEEN)]
             pair = None if kind == "none" else glasses.sample_glasses(sights[0].landmarks, rng, kind)
             pictures = [training.photograph_sight(sight, pair, rng, panoramas) for sight in sights]
-            told[kind].append([look(picture) for picture in pictures])
-    return {kind: counted(captures) for kind, captures in told.items()}
+            captures_by_kind[kind].append([look(picture) for picture in pictures])
+    return {kind: counted(captures) for kind, captures in captures_by_kind.items()}
 
 
 def counted(captures: list[list[float]]) -> dict:
-    """Of captures and of their single pictures: what becomes of them."""
+    """Return the verdicts of captures, and how surely their single pictures show glasses."""
     single = np.array([each for capture in captures for each in capture if np.isfinite(each)])
     ends = [verdict(capture) for capture in captures]
     return {
@@ -88,7 +84,7 @@ def counted(captures: list[list[float]]) -> dict:
 
 
 def real(data: Path) -> dict[str, list[list[np.ndarray]]]:
-    """Captures of real people without glasses by set, each a list of sRGB pictures."""
+    """Return captures of real people without glasses by set, each a list of sRGB pictures."""
     lamps = [
         images.read_srgb(path)
         for path in sorted((data / "near_ps_human1").glob("*.png"))
@@ -110,17 +106,16 @@ def read(folder: Path, pattern: str) -> Iterator[np.ndarray]:
 
 
 def filmed(video: Path) -> list[np.ndarray]:
-    """FILMED frames of a film, evenly spread."""
+    """Return FILMED frames of a film, evenly spread."""
     frames = list(read_film(video))
     return [frames[k].astype(np.float32) / 255 for k in np.linspace(0, len(frames) - 1, FILMED).astype(int)]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "glasses")
     parser.add_argument("data", type=Path, nargs="?", default=SHARED)
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_glasses")
     parser.add_argument("--hdri", type=Path)
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     record = {
         "real": {
@@ -130,8 +125,7 @@ def main() -> None:
     }
     record["rendered"] = rendered(options.work, options.hdri)
     print(json.dumps(record, indent=1))
-    if options.json:
-        figures.write_record(options.json, "glasses", COMMAND, record)
+    figures.write_record(options.json, "glasses", COMMAND, record)
 
 
 if __name__ == "__main__":

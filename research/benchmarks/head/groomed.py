@@ -1,24 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that is grown from pictures of people whose every hair is known: where it covers the face, and which way it
-lies.
+"""Compare hair grown from pictures with the known hair of people: where it covers the face, and its direction.
 
     python -m research.benchmarks.head.groomed FOLDER [--seeds 3 ...] [--trust] [--sheet docs/pictures/hair.jpg]
-                                 [--json research/records/groomed.json]
+        [--json research/records/groomed.json]
 
-The people of research/people/lifelike seen by rays from nine sides, lit by one lamp and a sky without shadows, through
-a phone's pipeline; cameras, head and the albedo's texture are the true ones, and the face parser is asked in these
-pictures as the chain asks it, so that nothing but finding hair, its strokes and its growth is judged. Coverage: pixels
-of the frames in which hair covers more than a tenth of a millimetre's surroundings, by the true and by the grown hairs.
-Amount: what both cover of a pixel's surroundings of 3 mm, over what either does: where single hairs lie counts no more.
-Beside both what the true hairs score when they are sown anew, with other roots and the same rule: where pictures show
-no single hairs, no growth can know more. Parser: texels to which it gives more than half, against those where hair
-grows. Direction: each true hair against the nearest grown one within 3 mm, from root to tip, on the skin; beside it
-what the usual directions alone give. FOLDER keeps the pictures."""
+The people of research/people/lifelike are seen by rays from nine sides, lit by one lamp and a sky without shadows,
+through a phone's pipeline; cameras, head and the albedo's texture are the true ones, so only the finding of hair, its
+strokes and its growth are judged. docs/results/hair.md explains the figures. FOLDER keeps the pictures.
+"""
 
-from __future__ import annotations
-
-import argparse
 from pathlib import Path
 
 import cv2
@@ -52,33 +43,9 @@ AROUND_MM, AMOUNT_MM = 1.0, 3.0
 """Deviations in mm of the surroundings in which hair is said to cover a pixel or not, and of those in which it is said
 how much it covers."""
 SOWN = {"brows": brows.grow_brows, "beard": beards.grow_beard}
-"""The rules by which the people have their hair."""
+"""Rules by which the people have their hair."""
 WANTED_IOU, WANTED_DEGREES = 0.7, 20
 COMMAND = "python -m research.benchmarks.head.groomed FOLDER --json research/records/groomed.json"
-WORDS = (
-    "Four people whose every hair is known, from nine sides through a phone's pipeline (1,440 x 1,920). No "
-    "other step of the chain lies between: cameras, head and texture are the true ones, and the face parser is "
-    "asked in these pictures. *IoU*: of the pixels that hair covers, by the true and by the grown hairs, seen "
-    "from either side of the front. *Amount*: what both cover of a pixel's surroundings of 3 mm, over what "
-    "either does. *Anew*: either one, for the true hairs sown anew by the same rule, with other roots: no more "
-    "can be known where pictures show no single hairs. *Parser*: of the texels to which the parser gives more "
-    "than half, and those where hair grows, whether a fringe hides them or not. *Off*: the median angle on the "
-    "skin between each true hair and the nearest grown one within 3 mm, from root to tip; *off, usual*: the "
-    "same of hair that lies as anatomy has it, whatever the strokes say. Wanted: an IoU of 0.7, and 20 "
-    "degrees. Nothing but the rules for stubble was chosen on these four. How clear strokes must be to "
-    "outweigh the usual direction was, on seeds 3, 5 and 13, and there the rule that joins the parser's answer "
-    "with the strokes was looked at, too. *mm*: mean length of the hairs.\n\n"
-    "A beard is stubble where its strokes are shorter than 2 mm and no more blue light is missing than stubble "
-    "and the shade of a shaven beard take, the shade as these people's generator paints it; then a hair is as "
-    "long as a stroke (core/stages/upscale/stroke_length.py). That rule was made with these people in view, and on no "
-    "others; so was the one that takes the parser's shares of a beard over what they are in its middle, which "
-    "the stubbled person asked for.\n\n"
-    "Where it falls short: of a beard no length is told, its hairs are 6 mm long on everybody (*Beard Length* "
-    "is the artist's). Stubble hides little of the skin, so its IoU mostly compares where hairs happen to lie "
-    "close together, which sown anew they do elsewhere; its hairs have the brows' colour. Where both brows lie "
-    "behind a fringe, usual ones are grown, in no colour of the person's. Dark brows become a little wider "
-    "than by dark strokes alone."
-)
 CHOSEN_ON, TRUSTS, TURNS = (3, 5, 13), (0.03, 0.1, 0.3, 1.0, 3.0), (-40, 0, 40)
 """People on whom the trust in strokes was chosen; degrees by which the usual directions are turned, for nobody's hair
 is all as usual."""
@@ -87,7 +54,7 @@ USUAL_ALONE = 1e6
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "groomed")
     parser.add_argument("folder", metavar="FOLDER", type=Path)
     parser.add_argument(
         "--seeds",
@@ -100,7 +67,6 @@ def main() -> None:
         "--trust", action="store_true", help="how far hair is off for how clear strokes must be (seeds 3, 5, 13)"
     )
     parser.add_argument("--sheet", type=Path, help="a picture of true and grown hair")
-    parser.add_argument("--json", type=Path, help="where the figures go, such as research/records/groomed.json")
     options = parser.parse_args()
     if options.trust:
         print(
@@ -117,116 +83,80 @@ def main() -> None:
         print(to_table(rows).splitlines()[-1], flush=True)
     if options.sheet:
         images.write_srgb(options.sheet, np.concatenate(pictures))
-    if options.json:
-        figures.write_record(options.json, "groomed", COMMAND, {"people": rows})
+    figures.write_record(options.json, "groomed", COMMAND, {"people": rows})
+
+
+COLUMNS = {
+    "true_hairs": "true hairs",
+    "grown_hairs": "grown hairs",
+    "true_mm": "true mm",
+    "grown_mm": "grown mm",
+    "iou": "IoU",
+    "iou_anew": "anew",
+    "amount": "amount",
+    "amount_anew": "anew",
+    "parser_iou": "parser",
+    "degrees": "off, degrees",
+    "usual_degrees": "off, usual",
+}
 
 
 def to_table(rows: dict[str, dict]) -> str:
-    """Markdown: a line for each part of each person."""
+    """Return Markdown: a line for each part of each person."""
     lines = [
-        [
-            name,
-            part,
-            row["true_hairs"],
-            row["grown_hairs"],
-            row.get("true_mm"),
-            row.get("grown_mm"),
-            row["iou"],
-            row.get("iou_anew"),
-            row["amount"],
-            row.get("amount_anew"),
-            row["parser_iou"],
-            row.get("degrees"),
-            row.get("usual_degrees"),
-        ]
-        for name, parts in rows.items()
-        for part, row in parts.items()
+        [name, part, *(row.get(key) for key in COLUMNS)] for name, parts in rows.items() for part, row in parts.items()
     ]
-    return figures.markdown(
-        [
-            "person",
-            "part",
-            "true hairs",
-            "grown hairs",
-            "true mm",
-            "grown mm",
-            "IoU",
-            "anew",
-            "amount",
-            "anew",
-            "parser",
-            "off, degrees",
-            "off, usual",
-        ],
-        lines,
-    )
+    return figures.markdown(["person", "part", *COLUMNS.values()], lines)
 
 
 def shortfalls(rows: dict[str, dict]) -> str:
-    """Return which rows miss what is wanted, and how often following the strokes is worth it."""
-    told = [(f"the {name} person's {part}", row) for name, parts in rows.items() for part, row in parts.items()]
-    known = [row for _, row in told if "degrees" in row]
-    thin = [f"{what} ({row['iou']:.2f})" for what, row in told if row["iou"] < WANTED_IOU]
+    """Return the rows that miss the goals, and how often following the strokes is worth it."""
+    parts_of_all = [(f"the {name} person's {part}", row) for name, parts in rows.items() for part, row in parts.items()]
+    with_directions = [row for _, row in parts_of_all if "degrees" in row]
+    thin = [f"{what} ({row['iou']:.2f})" for what, row in parts_of_all if row["iou"] < WANTED_IOU]
     off = [
         f"{what} ({row['degrees']:.0f} degrees)"
-        for what, row in told
+        for what, row in parts_of_all
         if "degrees" in row and row["degrees"] > WANTED_DEGREES
     ]
-    nearer = sum(row["degrees"] < row["usual_degrees"] for row in known)
+    nearer = sum(row["degrees"] < row["usual_degrees"] for row in with_directions)
     return (
         f"Below the IoU that is wanted: {', '.join(thin) or 'nothing'}; farther off: "
         f"{', '.join(off) or 'nothing'}. Hair that follows the strokes lies nearer to the true one than "
-        f"the usual directions alone in {nearer} of {len(known)} rows."
+        f"the usual directions alone in {nearer} of {len(with_directions)} rows."
     )
 
 
 def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
     """Return the figures of one person, and a picture [H, W, 3]: frame, true hair, grown hair."""
     figure = make_figure(seed)
-    views, seen = photograph(folder / str(seed), figure)
-    surface = lay_out(figure.head, SIZE)
-    maps, shown = read_maps(figure, views, seen)
+    views, colours = photograph(folder / str(seed), figure)
+    surface, judged = lay_out(figure.head, SIZE), [views[k] for k in JUDGED]
+    maps, shown = read_maps(figure, views, colours)
     found = hair.find(maps, surface, shown.shares[..., : len(GROWTHS)])
     cleaned, _ = hair.clean(maps, found, surface, seed)
     grown = grooming.groom(maps, found, cleaned, surface, seed)
     usual = grooming.groom(maps, found, cleaned, surface, seed, trust=USUAL_ALONE)
-    row = {}
-    true = {hairs.part: hairs for hairs in figure.strands}
-    for part in ("brows", "beard"):
-        if part in true or part in grown:
-            judged = [views[k] for k in JUDGED]
-            iou, amount = overlaps(figure, judged, true.get(part), grown.get(part))
-            row[part] = {
-                "true_hairs": _count(true.get(part)),
-                "grown_hairs": _count(grown.get(part)),
-                "iou": iou,
-                "amount": amount,
-                "parser_iou": _told(figure, shown, part),
-            }
-            if part in true:
-                row[part] |= dict(
-                    zip(
-                        ("iou_anew", "amount_anew"),
-                        overlaps(figure, judged, true[part], sow_anew(figure, part)),
-                        strict=True,
-                    )
-                )
-            if part in true and part in grown:
-                row[part] |= {
-                    "true_mm": _mean_mm(true[part]),
-                    "grown_mm": _mean_mm(grown[part]),
-                    "degrees": _off(true[part], grown[part], figure),
-                    "usual_degrees": _off(true[part], usual[part], figure),
-                }
-    return row, _picture(figure, views[VIEWS // 2], true, grown)
+    true, rows = {hairs.part: hairs for hairs in figure.strands}, {}
+    for part in (part for part in ("brows", "beard") if part in true or part in grown):
+        row = {"true_hairs": _count(true.get(part)), "grown_hairs": _count(grown.get(part))}
+        row["iou"], row["amount"] = overlaps(figure, judged, true.get(part), grown.get(part))
+        row["parser_iou"] = _parser_iou(figure, shown, part)
+        if part in true:
+            row["iou_anew"], row["amount_anew"] = overlaps(figure, judged, true[part], sow_anew(figure, part))
+        if part in true and part in grown:
+            row |= {"true_mm": _mean_mm(true[part]), "grown_mm": _mean_mm(grown[part])}
+            row["degrees"] = _off(true[part], grown[part], figure)
+            row["usual_degrees"] = _off(true[part], usual[part], figure)
+        rows[part] = row
+    return rows, _picture(figure, views[VIEWS // 2], true, grown)
 
 
 def try_trusts(folder: Path, seed: int) -> list[list]:
-    """For each part of a person: degrees by which the found directions are off the true hairs' in the median, for each
-    of TRUSTS, the mean over TURNS."""
+    """Return for each part of a person the median error of directions in degrees for each of TRUSTS."""
     figure = make_figure(seed, SIZE)
-    views, seen = photograph(folder / str(seed), figure)
-    surface, (maps, shown) = lay_out(figure.head, SIZE), read_maps(figure, views, seen)
+    views, colours = photograph(folder / str(seed), figure)
+    surface, (maps, shown) = lay_out(figure.head, SIZE), read_maps(figure, views, colours)
     found = hair.find(maps, surface, shown.shares[..., : len(GROWTHS)])
     landmarks, rows = template.landmark_points(surface.mesh), []
     for true in (hairs for hairs in figure.strands if hairs.part in ("brows", "beard")):
@@ -256,7 +186,7 @@ def _mean_mm(hairs: Strands) -> float:
 
 
 def _off(true: Strands, grown: Strands, figure: Figure) -> float:
-    """Median angle in degrees on the skin."""
+    """Return the median angle in degrees on the skin."""
     distance, nearest = cKDTree(grown.points[:, 0]).query(true.points[:, 0])
     close = distance < NEAR_MM / 1000
     normals = vertex_normals(figure.head)[cKDTree(figure.head.vertices).query(true.points[close, 0])[1]]
@@ -268,7 +198,7 @@ def _off(true: Strands, grown: Strands, figure: Figure) -> float:
 
 
 def _median_angle(directions: np.ndarray, true_directions: np.ndarray, normals: np.ndarray) -> float:
-    """Degrees between directions [N, 3] on the skin."""
+    """Return the median of the degrees between directions [N, 3] on the skin."""
     directions, true_directions = (
         way - (way * normals).sum(1, keepdims=True) * normals for way in (directions, true_directions)
     )
@@ -279,8 +209,7 @@ def _median_angle(directions: np.ndarray, true_directions: np.ndarray, normals: 
 
 
 def overlaps(figure: Figure, views: list[View], true: Strands | None, grown: Strands | None) -> tuple[float, float]:
-    """Of the views, the intersection over union of the pixels that hair covers, and the sum of the lesser of both
-    covers over that of the greater."""
+    """Return the intersection over union of covered pixels, and the sum of lesser over that of greater covers."""
     both = either = 0
     least = most = 0.0
     for view in views:
@@ -293,24 +222,23 @@ def overlaps(figure: Figure, views: list[View], true: Strands | None, grown: Str
 
 
 def sow_anew(figure: Figure, part: str) -> Strands:
-    """Return a person's hairs of a part as they would be with other roots."""
+    """Return a person's hairs of a part with other roots."""
     return SOWN[part](
         figure.person, ground_of(figure.head), SkinSurface(figure.head), np.random.default_rng([figure.person.seed, 99])
     )
 
 
-def _told(figure: Figure, parts_shown: PartsShown, part: str) -> float:
-    """Intersection over union of the texels to which the parser gives more than half and of those where such hair
-    grows, as far as a view shows them."""
+def _parser_iou(figure: Figure, parts_shown: PartsShown, part: str) -> float:
+    """Return the intersection over union of the parser's texels (more than half) and those where such hair grows."""
     grows = (
         images.resize(figure.growth[part], SIZE, SIZE) > 0.25 if part in figure.growth else np.zeros((SIZE, SIZE), bool)
     )
-    told, grows = (where[parts_shown.judged] for where in (parts_shown.shares[..., GROWTHS.index(part)] > 0.5, grows))
-    return round(float((told & grows).sum() / max((told | grows).sum(), 1)), 3)
+    parsed, grows = (where[parts_shown.judged] for where in (parts_shown.shares[..., GROWTHS.index(part)] > 0.5, grows))
+    return round(float((parsed & grows).sum() / max((parsed | grows).sum(), 1)), 3)
 
 
 def _cover(figure: Figure, view: View, hairs: Strands | None) -> np.ndarray:
-    """Share of each pixel [H, W] that hair covers."""
+    """Return the share of each pixel [H, W] that hair covers."""
     skin = figure.opened.skin
     whole = joined([skin, prisms(hairs)]) if hairs is not None else skin
     face, _, _ = raster.render_view(raster.RayCaster(whole), view, OVER)

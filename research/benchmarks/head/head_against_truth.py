@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Distance of a capture's head (or scan) to the true mesh, in the facial skin, after a similarity of the camera
-centres.
+"""Measure the distance of a capture's head or scan to the true mesh in the facial skin, by cameras and after ICP.
 
     python -m research.benchmarks.head.head_against_truth CAPTURE TRUTH [MESH] [--surface head.obj|scan.ply]
 
@@ -10,9 +9,6 @@ OBJ or PLY in that world, or a glTF in it turned Y up: (x, -z, y) of it is the w
 truth is the sample's subject.
 """
 
-from __future__ import annotations
-
-import argparse
 import json
 from pathlib import Path
 
@@ -29,14 +25,15 @@ from core.stages.registration.alignment import Similarity, similarity
 
 from ...people.identities import subject_mesh
 from ...people.sample import RESERVED
+from ..figures import command_line
 
 
 def compare_surface(capture: Capture, truth: Path, mesh: Path | None, surface: str = "head.obj") -> dict:
-    """Measure how far a capture's surface lies off the true one, over the face's pixels.
+    """Measure the distance of a capture's surface to the true one, over the face's pixels.
 
-    truth: its folder, with cameras and face/; mesh: the true surface; None: the sample's subject; surface: file of
-    the capture, OBJ or PLY. Returns Median, 90th and 95th percentile in mm, as placed by the cameras and after ICP
-    beside it; the cameras' own in mm."""
+    truth: folder with cameras and face/; mesh: the true surface, None: the sample's subject; surface: file of the
+    capture, OBJ or PLY. Returns median, 90th and 95th percentile in mm, as placed by the cameras and after ICP.
+    """
     pose, shared, theirs = pose_of_truth(capture, truth)
     frames = {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()}
     ours = np.stack([v.centre for v in shared])
@@ -58,8 +55,7 @@ def compare_surface(capture: Capture, truth: Path, mesh: Path | None, surface: s
 
 
 def settle(hits: np.ndarray, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Points [N, 3] of a surface, turned and shifted as one onto another one's points [M, 3] with normals [M, 3] (ICP
-    from point to plane)."""
+    """Return points [N, 3] moved rigidly onto points [M, 3] with normals [M, 3] (ICP, point to plane)."""
     tree = cKDTree(points)
     for _ in range(20):
         index = tree.query(hits, workers=-1)[1]
@@ -69,8 +65,7 @@ def settle(hits: np.ndarray, points: np.ndarray, normals: np.ndarray) -> np.ndar
 
 
 def pose_of_truth(capture: Capture, truth: Path) -> tuple[Similarity, list[View], np.ndarray]:
-    """Return what brings the world of TRUTH's cameras.json into the capture's, the views that are in both, and their
-    true centres [N, 3]."""
+    """Return the similarity from TRUTH's world to the capture's, the shared views, and their true centres [N, 3]."""
     frames = {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()}
     cameras = {
         c["frame"]: np.array(c["matrix_world"])[:3, 3]
@@ -82,8 +77,7 @@ def pose_of_truth(capture: Capture, truth: Path) -> tuple[Similarity, list[View]
 
 
 def sample_truth(mesh: Path | None = None, count: int = 1_500_000) -> tuple[np.ndarray, np.ndarray]:
-    """Points and normals [count, 3] over the true surface, the sample's subject or a mesh, in the world of
-    cameras.json."""
+    """Return points and normals [count, 3] over the true surface, in the world of cameras.json."""
     if mesh is None:
         subject = subject_mesh(RESERVED["sample"])
         loaded = trimesh.Trimesh(subject.vertices, subject.faces, process=False)
@@ -97,7 +91,7 @@ def sample_truth(mesh: Path | None = None, count: int = 1_500_000) -> tuple[np.n
 
 
 def _face_points(mesh: meshes.Mesh, views: list, frames: dict, truth: Path) -> np.ndarray:
-    """Return where the pixels of the facial-skin masks hit our surface [N, 3]."""
+    """Return the points [N, 3] of a surface at the pixels of the facial skin."""
     caster, hits = raster.RayCaster(mesh), []
     for view in views:
         path = truth / "face" / f"{frames[view.name]:04d}.png"
@@ -135,7 +129,7 @@ def _round(figure: float) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("capture", type=Path)
     parser.add_argument("truth", type=Path)
     parser.add_argument("mesh", type=Path, nargs="?")

@@ -1,16 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How well the distance of the pupils is found.
+"""Measure the error of the distance between the pupils, on synthetic heads of known size.
 
     python -m research.benchmarks.head.head_scale [SEED ...]
 
 Synthetic heads of known size, photographed by known cameras; printed is by how much too large each comes out and how
 far it leans, which is what PUPILS_PER_LIDS in core/stages/cameras/landmarks.py was set by (its 1.019 divides out; the
-heads it was set on are the default seeds)."""
-
-from __future__ import annotations
-
-import argparse
+heads it was set on are the default seeds).
+"""
 
 import numpy as np
 
@@ -20,6 +17,7 @@ from core.stages.cameras.world import intersect_rays
 
 from ...people import painted_head
 from ...people.identities import identity_coefficients
+from ..figures import command_line
 
 SEEDS = (5, 11, 23, 31, 42, 57)
 AZIMUTHS = (-40, -28, -18, -9, 0, 9, 18, 28, 40)
@@ -27,7 +25,7 @@ TEMPLATE_PUPILS_PER_LIDS = 63.0 / 62.156
 
 
 def measure(seed: int) -> tuple[float, float]:
-    """Error of the distance of the pupils in percent, and by how many degrees the head leans back."""
+    """Return the error of the distance of the pupils in percent, and how far the head leans back in degrees."""
     right, left = pupils(identity_coefficients(seed))
     true = np.linalg.norm(left - right) / PUPILS_PER_LIDS * TEMPLATE_PUPILS_PER_LIDS
     origins, directions = [], []
@@ -45,7 +43,7 @@ def measure(seed: int) -> tuple[float, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("seeds", type=int, nargs="*", default=SEEDS)
     errors = []
     for seed in parser.parse_args().seeds:

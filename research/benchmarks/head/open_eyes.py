@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Open eyes of filmed people against their truth: edges of the lids, eyeballs, gaze and the colour of the irises.
+"""Compare the open eyes of filmed people with their truth: lid edges, eyeballs, gaze and the colour of the irises.
 
     python -m research.benchmarks.head.open_eyes FOLDER [--only NAME ...] [--eyes FOLDER] [--json OUT.json]
 
@@ -11,11 +11,9 @@ research/benchmarks/captures/eye_captures.py, whose eyes are fitted here, by tru
 off, and whose irises are measured over their own skin's true albedo; then what no frame told is shown beside it: the
 eyes that these heads have by themselves. Distances in mm: from the fitted edges of the lids to the true ones, mean and
 largest of an eye's two; between the centres of the eyeballs. The iris' true colour is the median of the eye's picture
-between pupil and rim; delta E is CIE 2000."""
+between pupil and rim; delta E is CIE 2000.
+"""
 
-from __future__ import annotations
-
-import argparse
 import json
 import sys
 from pathlib import Path
@@ -39,7 +37,7 @@ from ...people.lifelike.figure import paint
 from ...people.lifelike.person import sample_person
 from ..captures.eye_captures import EYES
 from ..captures.likenesses import HELD_BACK, LIKENESSES
-from ..figures import markdown, write_record
+from ..figures import command_line, markdown, number, write_record
 from .cameras_against_truth import place_truth
 
 COLUMNS = (
@@ -59,7 +57,7 @@ QUIET = Reporter("registration", emit=lambda message: None)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__, "open_eyes")
     parser.add_argument("folder", type=Path)
     parser.add_argument(
         "--only",
@@ -68,7 +66,6 @@ def main() -> None:
         default=[person.name for person in LIKENESSES],
     )
     parser.add_argument("--eyes", type=Path, help="captures of research/benchmarks/captures/eye_captures.py")
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     rows = fit_alone(options.eyes.resolve()) if options.eyes else {}
     for name in options.only:
@@ -78,23 +75,10 @@ def main() -> None:
             continue
         for side, row in zip(SIDES, compare(capture, truth) if capture.eyes.is_file() else missed(truth), strict=False):
             rows[f"{name}, {side}"] = row
-    print(
-        markdown(
-            ["eye", *COLUMNS],
-            [
-                [name, *(None if row[column] is None else f"{row[column]:.2f}" for column in COLUMNS)]
-                for name, row in rows.items()
-            ],
-        )
-    )
-    if options.json:
-        write_record(
-            options.json,
-            "open_eyes",
-            "python -m research.benchmarks.head.open_eyes FOLDER --eyes FOLDER",
-            {"rows": rows},
-            keep=True,
-        )
+    lines = [[name, *(number(row[column], 2) for column in COLUMNS)] for name, row in rows.items()]
+    print(markdown(["eye", *COLUMNS], lines))
+    command = "python -m research.benchmarks.head.open_eyes FOLDER --eyes FOLDER"
+    write_record(options.json, "open_eyes", command, {"rows": rows}, keep=True)
 
 
 def compare(capture: Capture, truth: Path) -> list[dict]:
@@ -115,16 +99,14 @@ def compare(capture: Capture, truth: Path) -> list[dict]:
 
 
 def missed(truth: Path) -> list[dict]:
-    """Return the figures of the two eyes of a person whose eyes were taken for closed: none, but how open they are; no
-    rows where they are closed."""
+    """Return the rows of a person whose open eyes were taken for closed; none if they are closed."""
     openness = json.loads((truth / "cameras.json").read_text(encoding="utf-8"))["person"]["openness"]
     row = {**dict.fromkeys(COLUMNS), "openness": 0.0, "true openness": _plain(openness)}
     return [row, row] if openness else []
 
 
 def fit_alone(folder: Path) -> dict[str, dict]:
-    """Return the figures of the captures of eye_captures.py, by person and eye, fitted and as the head alone has
-    them."""
+    """Return the rows of eye_captures.py by person and eye, fitted and as the head alone has them."""
     rows, still = {}, (1.0, np.eye(3), np.zeros(3))
     for seed in (seed for seed in EYES if (folder / f"{seed}.wildcap" / "head.obj").is_file()):
         capture = Capture(folder / f"{seed}.wildcap")
@@ -132,10 +114,10 @@ def fit_alone(folder: Path) -> dict[str, dict]:
         closed = meshes.read_obj(capture.root / "truth" / "head.obj")
         true = lids.open_lids(closed, person["openness"], np.array(person["gaze"]))
         views, head = read_views(capture), meshes.read_obj(capture.head)
-        seen = landmarks.find(views, QUIET, 1.0)
-        marks = eyeballs.mark_rims(eye_looks.look(views, seen, QUIET), head, seen.opening, QUIET)
-        for name, told in (("", marks), (ALONE, (None, None))):
-            fitted = eyeballs.fit(head, told, seen.opening)
+        landmark_views = landmarks.find(views, QUIET, 1.0)
+        marks = eyeballs.mark_rims(eye_looks.look(views, landmark_views, QUIET), head, landmark_views.opening, QUIET)
+        for name, evidence in (("", marks), (ALONE, (None, None))):
+            fitted = eyeballs.fit(head, evidence, landmark_views.opening)
             colours = None if name else irises_over_own_skin(views, fitted, seed)
             for side, eye in enumerate(fitted.records()):
                 off = (
@@ -150,7 +132,7 @@ def fit_alone(folder: Path) -> dict[str, dict]:
 
 
 def irises_over_own_skin(views: list[View], fitted: eyeballs.OpenEyes, seed: int) -> tuple | None:
-    """Linear albedo of the left and the right iris by a person's true skin, where no solve has found it."""
+    """Return the linear albedo of both irises, measured over a person's true skin."""
     head = FilmedHead(fitted.head, fitted.opened.skin, [ball.mesh for ball in fitted.opened.balls])
     return measure_both_irises(views, head, fitted.records(), paint(sample_person(seed), SKIN_TEXELS)[1], QUIET)
 
@@ -158,9 +140,9 @@ def irises_over_own_skin(views: list[View], fitted: eyeballs.OpenEyes, seed: int
 def compare_eye(eye: Eyeball, opened: np.ndarray, true: lids.OpenHead, side: int, pose: tuple) -> dict:
     """Measure how far a fitted eye is off the true one.
 
-    opened: [N, 3], vertices of the open head, in the eyeball's world; side: 0 the left eye, 1 the right one; pose:
-    scale, rotation [3, 3] and translation [3] from the truth's world to theirs. Returns a figure of each of COLUMNS;
-    None for the iris' colour and the true openness."""
+    opened: [N, 3], vertices of the open head, in the eyeball's world; side: 0 left, 1 right; pose: scale, rotation [3,
+    3] and translation [3] from the truth's world to theirs. Returns a figure of each of COLUMNS.
+    """
     scale, turn, shift = pose
     ball = true.balls[side]
     rims = [
@@ -169,7 +151,7 @@ def compare_eye(eye: Eyeball, opened: np.ndarray, true: lids.OpenHead, side: int
     centre = scale * turn @ ball.centre + shift
     gaze = np.degrees(np.arccos(np.clip(turn @ ball.gaze @ np.array(eye.gaze), -1, 1)))
     iris = 1e3 * eye.iris_radius / scale - eyes.IRIS_MM if eye.iris_radius else None
-    told = (
+    figures = (
         1e3 * np.mean([off.mean() for off in rims]),
         1e3 * max(off.max() for off in rims),
         1e3 * np.linalg.norm(centre - eye.centre),
@@ -180,11 +162,11 @@ def compare_eye(eye: Eyeball, opened: np.ndarray, true: lids.OpenHead, side: int
         eye.openness,
         None,
     )
-    return dict(zip(COLUMNS, map(_plain, told), strict=True))
+    return dict(zip(COLUMNS, map(_plain, figures), strict=True))
 
 
 def true_iris(person: dict, radius: float) -> np.ndarray:
-    """Linear albedo [3] between pupil and rim, the median of the picture on eyeballs of a radius in metres."""
+    """Return the linear albedo [3] between pupil and rim, the median of the picture on an eyeball (radius in m)."""
     picture = eyes.paint_eyes(np.array(person["iris"]), radius, person["seed"])
     size = len(picture)
     y, x = (np.mgrid[0:size, 0:size] + 0.5) / size - 0.5
@@ -194,7 +176,7 @@ def true_iris(person: dict, radius: float) -> np.ndarray:
 
 
 def apart(a: np.ndarray, b: np.ndarray) -> float:
-    """CIE delta E 2000 of two linear colours."""
+    """Return the CIE delta E 2000 of two linear colours."""
     lab = [rgb2lab(images.linear_to_srgb(np.float32(colour)).reshape(1, 1, 3)) for colour in (a, b)]
     return float(deltaE_ciede2000(*lab)[0, 0])
 

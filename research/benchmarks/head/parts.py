@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How well the face parser (core/face/parser.py) tells the parts of people that no training sees.
+"""Measure the face parser (core/face/parser.py) on people that no training sees.
 
     python -m research.benchmarks.head.parts [--json OUT.json] [--frames FOLDER] [--weights FILE]
     python -m research.benchmarks.head.parts --sheet OUT.jpg --pictures FOLDER_OR_FILE ... [--weights FILE]
@@ -17,10 +17,6 @@ network what always says where parts usually are: the mean of the other people's
 head that is taken for skin; skin_as_hair: the reverse. The sheet of photographs is for looking only.
 """
 
-from __future__ import annotations
-
-import argparse
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -28,7 +24,7 @@ import numpy as np
 
 from core.face import faces, parser
 from core.face.parser_network import ParseNet
-from core.face.parts import PARTS, SIDE_PX, cut, inside, to_crop
+from core.face.parts import PARTS, cut, inside, to_crop
 from core.imaging import images
 
 from ...people.lifelike import snapshot, unlit
@@ -37,34 +33,22 @@ from ...people.lifelike.figure import make_figure
 from ...people.lifelike.truth import Scene
 from ..captures.films import read_film
 from ..captures.likenesses import LIKENESSES
-from ..figures import markdown, write_record
+from ..figures import command_line, markdown, number, write_record
+from ..pictures.sheet import in_rows
 
 VIEWS, SIZE, TEXELS = 8, 400, 1024
 SPARSE = 4.0
 HAIRS = ("brows", "beard", "hair")
 ENDINGS = (".png", ".jpg", ".jpeg")
-COLOURS = (
-    np.array(
-        [
-            [255, 190, 150],
-            [230, 0, 80],
-            [120, 60, 0],
-            [255, 150, 0],
-            [70, 70, 230],
-            [255, 255, 255],
-            [0, 160, 80],
-            [0, 0, 0],
-        ],
-        np.float32,
-    )
-    / 255
+COLOURS = np.float32(
+    [(255, 190, 150), (230, 0, 80), (120, 60, 0), (255, 150, 0), (70, 70, 230), (255,) * 3, (0, 160, 80), (0,) * 3]
 )
-"""Of the parts in a sheet."""
+COLOURS /= 255
+"""Colours of the parts in a sheet, in their order."""
 
 
 def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--json", type=Path)
+    options = command_line(__doc__, "parts")
     options.add_argument(
         "--frames", type=Path, metavar="FOLDER", help="what research.benchmarks.captures.likenesses wrote"
     )
@@ -88,20 +72,14 @@ def main() -> None:
     lines = []
     for name, r in rows.items():
         shares = (*r["iou"].values(), r["hair_as_skin"], r["skin_as_hair"])
-        lines.append([name, f"{r['found']} of {r['pictures']}", *(None if v is None else f"{v:.2f}" for v in shares)])
+        lines.append([name, f"{r['found']} of {r['pictures']}", *(number(v, 2) for v in shares)])
     print(markdown(["person", "found", *PARTS, "hair as skin", "skin as hair"], lines))
-    if options.json:
-        write_record(
-            options.json,
-            "parts",
-            "python -m research.benchmarks.head.parts" + (" --frames FOLDER" if options.frames else ""),
-            {"rows": rows},
-            keep=True,
-        )
+    command = "python -m research.benchmarks.head.parts" + (" --frames FOLDER" if options.frames else "")
+    write_record(options.json, "parts", command, {"rows": rows}, keep=True)
 
 
 def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """VIEWS sRGB pictures of a person and their shares, [S, S, 3] and [S, S, len(PARTS)]."""
+    """Yield VIEWS sRGB pictures of a person and their shares, [S, S, 3] and [S, S, len(PARTS)]."""
     figure = make_figure(seed, TEXELS)
     scene = Scene(figure)
     for view in range(VIEWS):
@@ -110,11 +88,11 @@ def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 
 
 def filmed(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Return the frames with truth of a filmed person and their shares, each hair SPARSE times."""
+    """Yield the frames with truth of a filmed person and their shares, each hair SPARSE times."""
     names = sorted(path.stem for path in (folder / "parts" / "hair").glob("*.png"))
-    for number, frame in enumerate(read_film(folder / "capture.mp4")):
-        if f"{number:04d}" in names:
-            parts = np.stack([images.read_mask(folder / "parts" / part / f"{number:04d}.png") for part in GROWN], -1)
+    for index, frame in enumerate(read_film(folder / "capture.mp4")):
+        if f"{index:04d}" in names:
+            parts = np.stack([images.read_mask(folder / "parts" / part / f"{index:04d}.png") for part in GROWN], -1)
             shares = unlit.true_shares(parts)
             shares[..., [PARTS.index(name) for name in HAIRS]] *= SPARSE
             yield frame.astype(np.float32) / 255, shares / shares.sum(-1, keepdims=True)
@@ -123,8 +101,7 @@ def filmed(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 def _crops(
     pictures: Iterator[tuple[np.ndarray, np.ndarray]], network: ParseNet
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Of each picture in which a face is found: the true parts, the network's, and where the crop shows the picture;
-    [SIDE, SIDE] each."""
+    """Yield for each picture with a face the true parts, the network's, and the picture's place, [SIDE, SIDE]."""
     for srgb, shares in pictures:
         face = faces.detect(srgb)
         if face is not None:
@@ -139,7 +116,7 @@ def usual_parts(crops: dict[str, list], name: str) -> np.ndarray:
 
 
 def row(crops: list[tuple[np.ndarray, np.ndarray, np.ndarray]], pictures: int) -> dict:
-    """Return the figures of some crops: (truth, found, known) each."""
+    """Return the figures of crops, (truth, found, known) each."""
     counted = np.zeros((len(PARTS), len(PARTS)), int)
     for truth, found, known in crops:
         np.add.at(counted, (truth[known], found[known]), 1)
@@ -164,26 +141,19 @@ def _share(count: int, total: int) -> float | None:
 
 def write_sheet(out: Path, pictures: list[Path], network: ParseNet) -> None:
     """Draw the crops of photographs (files, or folders of them), their parts in colours, and both in one."""
+    paths = [path for each in pictures for path in (sorted(each.iterdir()) if each.is_dir() else [each])]
     rows = []
-    for path in [
-        path
-        for each in pictures
-        for path in (sorted(each.iterdir()) if each.is_dir() else [each])
-        if path.suffix.lower() in ENDINGS
-    ]:
+    for path in (path for path in paths if path.suffix.lower() in ENDINGS):
         srgb = images.read_srgb(path)[..., :3]
         face = faces.detect(srgb)
         if face is None:
             print(f"{path.name}: no face was found")
             continue
         crop = cut(srgb, to_crop(face.landmarks))
-        drawn = (parser.parse(srgb, face.landmarks, network).crop @ COLOURS).astype(np.float32)
-        rows.append(np.hstack([crop, drawn, 0.55 * crop + 0.45 * drawn]))
-    rows += [np.zeros((SIDE_PX, 3 * SIDE_PX, 3), np.float32)] * (-len(rows) % 2)
-    sheet = np.vstack([np.hstack(pair) for pair in zip(rows[0::2], rows[1::2], strict=True)])
-    images.write_srgb(out, sheet)
+        parts = (parser.parse(srgb, face.landmarks, network).crop @ COLOURS).astype(np.float32)
+        rows.append(np.hstack([crop, parts, 0.55 * crop + 0.45 * parts]))
+    images.write_srgb(out, in_rows(rows, 2))
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     main()

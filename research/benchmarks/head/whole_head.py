@@ -1,26 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The completed head and the hair's masks, in numbers.
+"""Measure the completed head and the hair's masks.
 
-    python -m research.benchmarks.head.whole_head [--seeds 9101 9102 ...] [--size 512] [--json OUT.json] [CAPTURE ...]
+    python -m research.benchmarks.head.whole_head [--seeds 9101 9102 ...] [--subject SEED] [--json OUT] [CAPTURE ...]
 
 Synthetic subjects (truth known everywhere, only the face seen), mean over the seeds, as {"fill", "completed"}; `fill`
-is what the solver gives where nobody looked, its mean face in the subject's tone:
-  neck, ears, scalp   mean error of the hidden albedo's tone (over 2 mm), sRGB of 255
-  grain               deviation of log albedo between 0.5 and 1 mm, hidden neck over face; 1 is alike
-  brows, beard        correlation of the mask with what the painted hair takes from the albedo
-  bare_chin           cm^2 of beard found where there is none
-  below_hair          error of the albedo under brows and beard against the skin painted without hair, sRGB of 255:
-                      {"with hair", "clean"}
-Captures: border, the mean step of the log tone from 8 mm inside the seen part to 6 mm outside, {"fill", "completed",
-"within"}, the last between places as far apart inside; with --subject SEED (the captures are of that synthetic person)
-tone, the errors as above where nobody looked; cut, the step over the map's own cut beside that of neighbours; hair,
-cm^2.
+is the solver's mean face in the subject's tone. neck, ears, scalp: mean error of the hidden tone over 2 mm, sRGB of
+255; grain: deviation of log albedo between 0.5 and 1 mm, hidden neck over face; brows, beard: correlation of the mask
+with what the painted hair takes from the albedo; bare_chin: cm^2 of beard where there is none; below_hair: error of the
+albedo under brows and beard, sRGB of 255. Captures: border, the mean step of the log tone over the seen part's border,
+and between places as far apart inside; cut, the step over the map's own cut beside that of neighbours; hair, cm^2; with
+--subject, their synthetic person, tone, the errors as above where nobody looked.
 """
 
-from __future__ import annotations
-
-import argparse
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -44,47 +36,33 @@ from core.stages.upscale.whole_head import UNSEEN_CONFIDENCE, complete
 
 from ...people.parameters import sample_parameters
 from ...people.skin import make_skin
-from ..figures import write_record
+from ..figures import command_line, write_record
 
 SEEDS = [9101, 9102, 9103, 9104, 9105, 9106]
+SIZE = 512  # texels along a side
 RINGS = (8.0, 11.0), (-6.0, -3.0), (22.0, 25.0)
 """mm inside the border: the seen side, the unseen side, and farther in."""
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        prog="python -m research.benchmarks.head.whole_head", description=__doc__.splitlines()[0]
-    )
+    parser = command_line(__doc__, "whole_head")
     parser.add_argument("captures", nargs="*", type=Path)
     parser.add_argument("--seeds", nargs="*", type=int, default=SEEDS)
-    parser.add_argument("--subject", type=int)
-    parser.add_argument("--size", type=int, default=512)
-    parser.add_argument(
-        "--json",
-        type=Path,
-        help="where the figures go, such as research/records/whole_head.json; those of other captures stay",
-    )
+    parser.add_argument("--subject", type=int, help="seed of the synthetic person that the captures show")
     options = parser.parse_args()
     found = {}
     if options.seeds:
-        surface = lay_out(template.load(), options.size)
-        rows = [{**whole(seed, surface), **hairs(seed, surface)} for seed in options.seeds]
-        found["synthetic"] = {name: _mean([row[name] for row in rows]) for name in rows[0]}
+        surface = lay_out(template.load(), SIZE)
+        found["synthetic"] = _mean([{**whole(seed, surface), **hairs(seed, surface)} for seed in options.seeds])
     for path in options.captures:
         found[path.stem] = of_capture(Capture(path), options.subject)
     print(json.dumps(found, indent=1))
-    if options.json:
-        write_record(
-            options.json,
-            "whole_head",
-            "python -m research.benchmarks.head.whole_head [--subject SEED] [CAPTURE]",
-            found,
-            keep=True,
-        )
+    command = "python -m research.benchmarks.head.whole_head [--subject SEED] [CAPTURE]"
+    write_record(options.json, "whole_head", command, found, keep=True)
 
 
 def whole(seed: int, surface: HeadSurface) -> dict:
-    """Return how near the hidden head comes to its truth."""
+    """Return the error of the hidden head."""
     size = surface.size
     truth, face = _painted(surface, seed), template.mask("face", size)
     skin = torch.from_numpy(np.ascontiguousarray(template.mask("skin", size)))
@@ -101,13 +79,7 @@ def whole(seed: int, surface: HeadSurface) -> dict:
         specular=specular.astype(np.float32),
     )
     done, hidden = complete(cut, surface, Reporter("upscale"), seed), face < 0.02
-    row: dict = {}
-    for region in ("neck", "ears", "scalp"):
-        where = hidden & (template.mask(region, size) > 0.9)
-        row[region] = {
-            name: _error(*(_tone(m, surface) for m in (maps, truth)), where)
-            for name, maps in (("fill", cut), ("completed", done))
-        }
+    row = _tone_errors({"fill": cut, "completed": done}, truth, hidden, surface)
     near = hidden & (template.mask("neck", size) > 0.9) & (surface.texel < 1.5 * np.median(surface.texel))
     row["grain"] = {
         name: _grain(maps, near, surface) / _grain(truth, skin.numpy() > 0.99, surface)
@@ -117,7 +89,7 @@ def whole(seed: int, surface: HeadSurface) -> dict:
 
 
 def hairs(seed: int, surface: HeadSurface) -> dict:
-    """Return how well hair is found and taken away; the subject three times: bearded, shaven, without brows."""
+    """Return the errors of finding and removing hair; the subject bearded, shaven, and without brows."""
     bearded, shaven, bare = (
         _painted(surface, seed, **changes)
         for changes in ({"beard": 0.8, "beard_length": 1.0}, {"beard": 0.0}, {"beard": 0.0, "brow_density": 0.0})
@@ -137,32 +109,22 @@ def hairs(seed: int, surface: HeadSurface) -> dict:
 
 
 def of_capture(capture: Capture, subject: int | None = None) -> dict:
-    """Return how far the border and the map's cut show, before and after, and how much hair there is."""
+    """Return how far the border and the map's cut show, before and after, and the area of hair."""
     maps = read_maps(capture.maps, capture.texture_confidence)
     surface = lay_out(read_head(capture).mesh, len(maps.diffuse))
     report = Reporter("upscale")
     done = complete(maps, surface, report)
-    seen = cv2.morphologyEx(
+    visible = cv2.morphologyEx(
         (maps.seen >= UNSEEN_CONFIDENCE).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8)
     )
-    seen = seen.astype(bool) | (template.mask("face", surface.size) > 0.5)
-    inside = (_distance(seen) - _distance(~seen)) * surface.texel
+    visible = visible.astype(bool) | (template.mask("face", surface.size) > 0.5)
+    inside = (_distance(visible) - _distance(~visible)) * surface.texel
     rings = [(inside > low) & (inside < high) for low, high in RINGS]
     found = hair.find(done, surface)
     tones = {}
     if subject is not None:
-        truth, hidden = _painted(surface, subject), maps.confidence < 0.02
-
-        def error(maps, region: str):
-            where = hidden & (template.mask(region, surface.size) > 0.9)
-            return _error(*(_tone(m, surface) for m in (maps, truth)), where)
-
-        tones = {
-            "tone": {
-                region: {"fill": error(maps, region), "completed": error(done, region)}
-                for region in ("neck", "ears", "scalp")
-            }
-        }
+        states = {"fill": maps, "completed": done}
+        tones["tone"] = _tone_errors(states, _painted(surface, subject), maps.confidence < 0.02, surface)
     return {
         **tones,
         "completed_share_percent": report.figures["completed_share_percent"],
@@ -176,22 +138,24 @@ def of_capture(capture: Capture, subject: int | None = None) -> dict:
     }
 
 
+def _tone_errors(states: dict[str, HeadMaps], truth: HeadMaps, hidden: np.ndarray, surface: HeadSurface) -> dict:
+    """Return region -> state -> error of the hidden tone."""
+    tones, true = {name: _tone(maps, surface) for name, maps in states.items()}, _tone(truth, surface)
+    regions = {region: hidden & (template.mask(region, surface.size) > 0.9) for region in ("neck", "ears", "scalp")}
+    return {
+        region: {name: _error(tone, true, where) for name, tone in tones.items()} for region, where in regions.items()
+    }
+
+
 def _painted(surface: HeadSurface, seed: int, **changes) -> HeadMaps:
     skin = make_skin(replace(sample_parameters(seed), **changes), surface.size)
     one = np.ones((surface.size,) * 2, np.float32)
-    return HeadMaps(
-        skin.diffuse.astype(np.float32),
-        skin.normal.astype(np.float32),
-        skin.specular,
-        0.7 * one,
-        np.repeat(one[..., None], 3, 2),
-        one,
-    )
+    diffuse, normal = skin.diffuse.astype(np.float32), skin.normal.astype(np.float32)
+    return HeadMaps(diffuse, normal, skin.specular, 0.7 * one, np.repeat(one[..., None], 3, 2), one)
 
 
 def _step(maps: HeadMaps, ring: np.ndarray, next_ring: np.ndarray, surface: HeadSurface) -> float:
-    """Mean difference of the log tone (over 2 mm) between the texels of a ring and the nearest of another on the
-    surface."""
+    """Return the mean difference of log tone (over 2 mm) between a ring's texels and the nearest of another."""
     tone = np.log(_tone(maps, surface))
     _, nearest = cKDTree(surface.position[ring][::4]).query(surface.position[next_ring][::4], distance_upper_bound=25.0)
     met = nearest < len(surface.position[ring][::4])
@@ -205,8 +169,7 @@ def _tone(maps: HeadMaps, surface: HeadSurface) -> np.ndarray:
 
 
 def _cut(maps: HeadMaps, surface: HeadSurface) -> dict:
-    """Mean step of log albedo over the map's cut (less than 1 mm apart in space, far apart in the map), and between
-    neighbours along its edge."""
+    """Return the mean step of log albedo over the map's cut (less than 1 mm apart), and between neighbours."""
     edge = np.zeros(surface.covered.shape, bool)
     edge[[0, -1]] = edge[:, [0, -1]] = True
     light, at, place = np.log(np.maximum(maps.diffuse, 0.004)).mean(2), np.argwhere(edge), surface.position[edge]
@@ -232,7 +195,7 @@ def _darker(hairy: HeadMaps, bare: HeadMaps) -> np.ndarray:
 
 
 def _alike(cover: np.ndarray, true: np.ndarray) -> float:
-    """0 where nothing was found."""
+    """Return the correlation over the face; 0 if nothing was found."""
     face = template.mask("face", len(cover)) > 0.5
     return float(np.corrcoef(cover[face], true[face])[0, 1]) if cover[face].std() > 0 else 0.0
 

@@ -1,14 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The small capture that is killed: eight frames of the sample video with their true cameras, run once through the real
-stages, undisturbed.
+"""Small capture that is killed: eight frames of the sample video with their true cameras, run once undisturbed.
 
-A place is a folder with the capture face.wildcap, a file of the user's beside it, and deliveries. Kept are the place as
-it was before each stage, the one at the end, and, where they are asked for, the one in which a stage was run with other
-settings.
+A place is a folder with the capture face.wildcap, a file of the user's beside it, and deliveries. The place is kept as
+it was before each stage and at the end, and, on demand, after a stage was run with other settings.
 """
-
-from __future__ import annotations
 
 import shutil
 import time
@@ -23,10 +19,9 @@ from core.capture.hashes import read_hash
 from core.capture.messages import Done
 from core.worker.job import write_job
 
+from ..figures import SAMPLE
 from .worker import Forked, Moment, fork_worker, in_fork
 
-ROOT = Path(__file__).resolve().parents[3]
-SAMPLE = ROOT / "research" / "people" / "sample"
 SETTINGS = {
     "frames": {"max_frames": 8, "long_side": 320, "views": 3},
     "cameras": {"import_from": str(SAMPLE / "cameras.json")},
@@ -37,7 +32,7 @@ SETTINGS = {
     "upscale": {"size": 1024, "method": "lanczos"},
     "transfer": {"scan_size": 256, "scan_detail_mm": 10.0},
 }
-"""As little work as every stage takes."""
+"""Least work of every stage."""
 OTHER = {
     "frames": {"long_side": 352},
     "cameras": {"interpupillary_mm": 64.0},
@@ -50,49 +45,39 @@ OTHER = {
     "upscale": {"hair": False},
     "transfer": {"scan_size": 288},
 }
-"""What a stage was run with before, where it is run again."""
+"""Settings of the earlier run, where a stage is run again."""
 DELIVERY = {"preset": "blender", "format": "obj", "whole": True, "size": "1024"}
 EARLIER = {**DELIVERY, "hair": False, "roughness": 60}
-"""The delivery that is there already."""
+"""Settings of the delivery that is there already."""
 STRANGERS = {
     name: f"This is {name}, and not WildCap's.\n".encode()
     for name in (
-        "shopping.txt",
-        ".mine.tmp",
-        "notes/list.txt",
-        "frames/retouched.psd",
-        "frames/.mine.1.tmp.jpg",
-        "cameras/rig.txt",
-        "delit/look/a.txt",
-        "maps/painted.psd",
-        "maps_4k/painted.psd",
-        "delivery/notes.txt",
-        "report/notes.txt",
-        "mask_history/notes.txt",
-        "preview/notes.txt",
-        "logs/mine.txt",
-    )
+        "shopping.txt .mine.tmp notes/list.txt frames/retouched.psd frames/.mine.1.tmp.jpg cameras/rig.txt "
+        "delit/look/a.txt maps/painted.psd maps_4k/painted.psd delivery/notes.txt report/notes.txt "
+        "mask_history/notes.txt preview/notes.txt logs/mine.txt"
+    ).split()
 }
-"""Files of the user's in the capture: name -> content."""
+"""User's files in the capture: name -> content."""
 GUESTS = {
     name: f"This is {name}, and no delivery's.\n".encode()
     for name in ("render.txt", "textures/painted.psd", ".look/shader.ma")
 }
-"""The same in a folder of a delivery."""
+"""User's files in the folder of a delivery."""
 BESIDE = "anna.txt"
 
 
 @dataclass
 class Undisturbed:
-    """One run of the chain with nothing in its way. `folder` holds the places; `names` are the stages that were run, in
-    order."""
+    """One run of the chain with nothing in its way; `folder` holds the places, `names` the stages in order.
+
+    seconds, changes: of each stage, and of the delivery; known: name in the capture -> hashes of its complete contents.
+    """
 
     folder: Path
     settings: dict
     names: tuple[str, ...]
     seconds: dict[str, float] = field(default_factory=dict)
-    changes: dict[str, int] = field(default_factory=dict)  # of files in the capture, as worker counts them
-    # name in the capture -> hashes of all complete contents it can have
+    changes: dict[str, int] = field(default_factory=dict)
     known: dict[str, set[str]] = field(default_factory=dict)
 
     @property
@@ -100,19 +85,18 @@ class Undisturbed:
         return capture_at(self.folder / "end")
 
     def base(self, stage: str, again: bool) -> Path:
-        """The place before a stage was run; or where it has been run, with other settings."""
+        """Return the place before a stage was run; `again`: after it was run with other settings."""
         if not again:
             return self.folder / f"before_{stage}"
         place = self.folder / f"again_{stage}"
         if not place.is_dir():
-            self.copy(self.folder / f"before_{stage}", place)
+            copy_place(self.folder / f"before_{stage}", place)
             run(place, **self.job(stage, **{stage: {**self.settings.get(stage, {}), **OTHER[stage]}}))
-            self._learn(capture_at(place))
+            self.learn(place)
         return place
 
     def job(self, stage: str, resumed: bool = False, **changed: dict) -> dict:
-        """The job that runs a stage whatever there is, or the one that goes on up to it from what there is; `changed`
-        lies over the settings."""
+        """Return the job that runs a stage in any case, or, `resumed`, goes on up to it; `changed` settings win."""
         return {
             "source": SAMPLE / "capture.mp4" if stage == stages.NAMES[0] else "",
             "first": None if resumed else stage,
@@ -121,56 +105,49 @@ class Undisturbed:
         }
 
     def delivered(self) -> Path:
-        """The finished place with a delivery in the capture and one beside it, and files of the user's in both."""
+        """Return the finished place with a delivery in the capture and one beside it, and the user's files in both."""
         place = self.folder / "delivered"
         if not place.is_dir():
-            self.copy(self.folder / "end", place)
+            copy_place(self.folder / "end", place)
             for target in delivery_folders(place):
-                self.deliver(place, target, EARLIER)
+                run(place, **self.delivery_job(place, target, EARLIER))
                 for name, content in GUESTS.items():
                     (target / name).parent.mkdir(exist_ok=True)
                     (target / name).write_bytes(content)
-            again = self.folder / "delivered_again"
-            self.copy(place, again)
+            again = copy_place(place, self.folder / "delivered_again")
             for target in delivery_folders(again):
-                worker = self.deliver(again, target, DELIVERY)
-                self.seconds["deliver"], self.changes["deliver"] = time.monotonic() - worker.began, worker.changes
+                self.measure("deliver", again, self.delivery_job(again, target))
         return place
-
-    def deliver(self, place: Path, target: Path, settings: dict) -> Forked:
-        """Deliver the head of a finished place to one of its delivery folders, undisturbed."""
-        return run(place, **self.delivery_job(place, target, settings))
 
     def delivery_job(self, place: Path, target: Path, settings: dict = DELIVERY) -> dict:
         folder = {} if target.is_relative_to(capture_at(place).root) else {"folder": str(target.parent)}
         return {"tool": "deliver", "settings": {**self.settings, "deliver": {**settings, **folder}}}
 
-    def copy(self, place: Path, to: Path) -> Path:
-        return shutil.copytree(place, to, symlinks=True)
+    def measure(self, name: str, place: Path, job: dict) -> None:
+        """Run a job, and keep its time and changes under a name."""
+        worker = run(place, **job)
+        self.seconds[name], self.changes[name] = time.monotonic() - worker.began, worker.changes
 
-    def _learn(self, capture: Capture) -> None:
-        for path in capture.root.rglob("*"):
-            if path.is_file():
-                self.known.setdefault(path.relative_to(capture.root).as_posix(), set()).add(read_hash(path))
+    def learn(self, place: Path) -> None:
+        """Add the contents of a capture to those that are known as complete."""
+        root = capture_at(place).root
+        for path in (path for path in root.rglob("*") if path.is_file()):
+            self.known.setdefault(path.relative_to(root).as_posix(), set()).add(read_hash(path))
 
 
 def run_undisturbed(
     folder: Path, until: str = stages.NAMES[-1], delighter: str = "network", tell: Callable[[str], None] = print
 ) -> Undisturbed:
-    """Run the chain up to a stage, and keeps the place before each and at the end.
-
-    Raises AssertionError where a stage does not end well; and the machine's own errors."""
+    """Run the chain up to a stage, and keep the place before each stage and at the end."""
     names = stages.NAMES[: stages.NAMES.index(until) + 1]
     found = Undisturbed(folder, {**SETTINGS, "delight": {"delighter": delighter}}, names)
     place = folder / "end"
     _plant(place)
     for name in names:
-        found.copy(place, folder / f"before_{name}")
-        began = time.monotonic()
-        worker = run(place, **found.job(name))
-        found.seconds[name], found.changes[name] = time.monotonic() - began, worker.changes
-        found._learn(capture_at(place))
-        tell(f"{name:14}{found.seconds[name]:5.1f} s, {worker.changes} changes")
+        copy_place(place, folder / f"before_{name}")
+        found.measure(name, place, found.job(name))
+        found.learn(place)
+        tell(f"{name:14}{found.seconds[name]:5.1f} s, {found.changes[name]} changes")
     return found
 
 
@@ -178,34 +155,32 @@ def capture_at(place: Path) -> Capture:
     return Capture(place / "face.wildcap")
 
 
-def start_job(
-    place: Path, moment: Moment | None = None, *, log_name: str = "told", limits: dict | None = None, **job
-) -> Forked:
-    """Write a job and starts a worker at it.
+def copy_place(place: Path, to: Path) -> Path:
+    return shutil.copytree(place, to, symlinks=True)
 
-    moment: when the worker is struck; None: never; log_name: ending of the file beside the place that takes its
-    output; limits: `term_s` and `most_bytes` of `fork_worker`; job: as `write_job` has it."""
-    return fork_worker(
-        write_job(capture_at(place), **job), place.with_name(f"{place.name}.{log_name}"), moment, **(limits or {})
-    )
+
+def start_job(place: Path, moment: Moment | None = None, term_s: float | None = None, **job) -> Forked:
+    """Write a job, as `write_job` takes it, and fork a worker for it; its output goes to a file beside the place."""
+    log = place.with_name(f"{place.name}.told")
+    return fork_worker(write_job(capture_at(place), **job), log, moment, **({"term_s": term_s} if term_s else {}))
 
 
 def run(place: Path, **job) -> Forked:
-    """Run a job to its end, which has to be a good one."""
+    """Run a job to its end, which must be a good one."""
     worker = start_job(place, **job)
     ended = worker.wait()
-    assert isinstance(ended, Done), ended or worker.told.with_suffix(".err").read_text()
+    assert isinstance(ended, Done), ended or worker.errors
     return worker
 
 
 def delivery_folders(place: Path) -> list[Path]:
-    """Where the deliveries in the capture and beside it lie."""
+    """Return the folders of the deliveries in the capture and beside it."""
     name = f"face_head_{DELIVERY['preset']}_{DELIVERY['format']}"
     return [capture_at(place).exports / name, place / "out" / name]
 
 
 def _plant(place: Path) -> None:
-    """A new capture with the user's files and two painted masks in it."""
+    """Make a new capture with the user's files and two painted masks in it."""
     capture = capture_at(place)
     place.mkdir(parents=True)
     (place / BESIDE).write_bytes(STRANGERS["shopping.txt"])
@@ -213,13 +188,12 @@ def _plant(place: Path) -> None:
     for name, content in STRANGERS.items():
         (capture.root / name).parent.mkdir(parents=True, exist_ok=True)
         (capture.root / name).write_bytes(content)
-    in_fork(
-        lambda: [_paint(path, shift) for path, shift in ((capture.shadow_mask, 0), (capture.protect_mask, 9))] and None
-    )
+    for path, shift in ((capture.shadow_mask, 0), (capture.protect_mask, 9)):
+        in_fork(lambda path=path, shift=shift: _paint(path, shift))
 
 
 def _paint(path: Path, shift: int) -> None:
-    """A mask of bars, 256 x 256."""
+    """Write a mask of bars, 256 x 256."""
     import numpy as np
 
     from core.imaging import images

@@ -1,13 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Disks in memory that only this process and its children see, of a size that can be too small: what a full disk is
-tried on.
+"""Disks in memory that only this process and its children see, small enough to be full.
 
-Linux only: mount namespaces (unshare(2), user_namespaces(7)) and tmpfs(5). Whoever may not make them tries full disks
-by a limit on the size of a file.
+Linux only: mount namespaces (unshare(2), user_namespaces(7)) and tmpfs(5).
 """
-
-from __future__ import annotations
 
 import contextlib
 import ctypes
@@ -20,19 +16,15 @@ PRIVATE, REMOUNT, DETACH = 0x4000 | 0x40000, 0x20, 0x2  # MS_REC | MS_PRIVATE, M
 
 
 def go_private() -> bool:
-    """Give this process mounts of its own; False where the system does not allow it. Only before it has started a
-    thread."""
+    """Give this process mounts of its own; False if the system does not allow it. Call it before any thread starts."""
     if not sys.platform.startswith("linux"):
         return False
     user, group = os.getuid(), os.getgid()
     try:
         _call("unshare", NEW_MOUNTS if user == 0 else NEW_MOUNTS | NEW_USER)
         if user:
-            for name, text in (
-                ("setgroups", "deny"),
-                ("uid_map", f"{user} {user} 1"),
-                ("gid_map", f"{group} {group} 1"),
-            ):
+            maps = {"setgroups": "deny", "uid_map": f"{user} {user} 1", "gid_map": f"{group} {group} 1"}
+            for name, text in maps.items():
                 Path(f"/proc/self/{name}").write_text(text, encoding="ascii")
         _call("mount", b"none", b"/", None, PRIVATE, None)
     except OSError:
@@ -41,7 +33,7 @@ def go_private() -> bool:
 
 
 def mount(folder: Path, size: int) -> None:
-    """An empty disk of `size` bytes in memory at a folder. Raises OSError."""
+    """Mount an empty disk of `size` bytes at a folder."""
     _call("mount", b"tmpfs", bytes(folder), b"tmpfs", 0, f"size={size}".encode())
 
 

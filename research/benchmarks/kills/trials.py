@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One function for each kind of trial: what is begun in a place, what strikes it, and what has to hold afterwards."""
+"""Kinds of trial: what begins in a place, what strikes it, and what must hold afterwards."""
 
-from __future__ import annotations
-
+import importlib
 import json
+import os
 import random
 import shutil
 import signal
@@ -12,86 +12,96 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 from core.capture import stages
-from core.capture.capture import Capture
+from core.capture.delivery_plan import PROVENANCE
 from core.capture.messages import Done, Failed
 from core.worker.client import Worker
 from core.worker.job import write_job
 
-from .. import same_maps
+from ..figures import ROOT
+from ..same_maps import written
 from . import disk, judge
-from .capture import ROOT, Undisturbed, capture_at, start_job
-from .worker import Moment, fork_worker
+from .capture import DELIVERY, GUESTS, Undisturbed, capture_at, copy_place, delivery_folders, start_job
+from .worker import Forked, Moment, fork_worker, in_fork, running_at
 
 SHORT_TERM_S = 1.0
-"""The lease's term in trials in which one worker waits for another that sleeps."""
-MOST_KILLS = 3
-LATEST_S = 0.03
-"""After a change of a file: what a library of C++ writes, it writes then."""
+"""Term of the lease where one worker waits for another that is stopped."""
+LATE_S = 0.03
+"""Longest delay after a change of a file: the time in which a C++ library writes."""
 ROOM, PAGE = 64 << 20, 4096
 SPARE = 1.2
-"""Of what a stage needs for its files: some is written twice on the way."""
+"""Share of a stage's files that it may need on the way: some are written twice."""
+MASKS = {'SHADOW': "shadow_mask.png", 'PROTECT': "protect_mask.png"}
+MASK_SIDE, SAVES, SAVE_CHANGES = 1024, 3, 34
+"""Side of a painted mask, how often it is saved, and about how many changes that makes."""
+COLMAP_S, PARTING_S = 2.5, 5.0
+"""Latest strike after COLMAP's start; time in which a process ends whose parent is gone."""
 
 
 @dataclass
 class KillTrial:
-    """What a trial did and found. `where` says what was struck and when."""
+    """Course and the faults of one trial; `where` tells what was struck and when.
+
+    private: whether full disks are disks of their own.
+    """
 
     number: int
     kind: str
     rng: random.Random
     undisturbed: Undisturbed
     place: Path
-    private: bool  # whether disks of our own can be made
+    private: bool
     where: str = ""
     struck: int = 0
     faults: list[str] = field(default_factory=list)
 
-    def stage(self) -> str:
-        return self.rng.choice(self.undisturbed.names)
+    def chance(self, share: float = 0.5) -> bool:
+        return self.rng.random() < share
 
     def moment(self, stage: str, writing: bool) -> Moment:
-        """A random one in the stage: of its time, or of its changes of files."""
+        """Draw a moment of a stage: in its time, or at one of its changes of files."""
         if not writing:
             return Moment(after_s=self.rng.uniform(0, 1.05 * self.undisturbed.seconds[stage]))
-        late = self.rng.uniform(0, LATEST_S) if self.rng.random() < 0.5 else 0.0
+        late = self.rng.uniform(0, LATE_S) if self.chance() else 0.0
         return Moment(write=self.rng.randint(1, self.undisturbed.changes[stage]), late_s=late)
 
-    def begin(self, stage: str) -> None:
-        """The place as it was before a stage, or with what the stage made of other settings."""
-        again = self.rng.random() < 0.5
-        self.undisturbed.copy(self.undisturbed.base(stage, again), self.place)
-        self.where += f"{stage}{' again' if again else ''}"
+    def draw_stage(self) -> str:
+        """Draw a stage, and copy the place before it, or with what other settings made of it."""
+        stage, again = self.rng.choice(self.undisturbed.names), self.chance()
+        copy_place(self.undisturbed.base(stage, again), self.place)
+        self.where = f"{stage}{' again' if again else ''}"
+        return stage
 
-    def resume(self, stage: str, masks: dict | None = None) -> None:
-        """The undisturbed worker that goes on, and what has to hold at the end."""
+    def beside(self, name: str) -> Path:
+        """Return a path beside the place."""
+        return self.place.with_name(f"{self.place.name}.{name}")
+
+    def check(self, right: object, fault: str) -> None:
+        if not right:
+            self.faults.append(fault)
+
+    def judge_kill(self, **more) -> None:
+        found = judge.judge_kill(self.place, self.undisturbed.known, **more)
+        self.faults += [f"after the kill: {fault}" for fault in found]
+
+    def judge_end(self, last: str, **more) -> None:
+        self.faults += judge.judge_resume(self.place, self.undisturbed, last, **more)
+
+    def resume(self, stage: str, **more) -> None:
+        """Let an undisturbed worker go on, and judge the end."""
         ended = start_job(self.place, **self.undisturbed.job(stage, resumed=True)).wait()
-        if not isinstance(ended, Done):
-            self.fault(f"the resumed run did not end well: {ended}")
-        self.judge_end(stage, masks)
-
-    def fault(self, text: str) -> None:
-        self.faults.append(text)
-
-    def judge_end(self, stage: str, masks: dict | None = None, unlike: tuple = (), unlike_folders: tuple = ()) -> None:
-        """Take in the faults at the end of a run that went on.
-
-        stage: the last one that was run."""
-        self.faults += judge.judge_resume(self.place, self.undisturbed, stage, masks, unlike, unlike_folders)
-
-    def judge_kill(self, masks: dict | None = None, within: tuple = ()) -> None:
-        self.faults += [
-            f"after the kill: {fault}" for fault in judge.judge_kill(self.place, self.undisturbed.known, masks, within)
-        ]
+        self.check(isinstance(ended, Done), f"the resumed run did not end well: {ended}")
+        self.judge_end(stage, **more)
 
 
 def killed(trial: KillTrial, writing: bool) -> None:
-    """A worker and its group are killed, up to three times in a row, and then left to end."""
-    stage = trial.stage()
-    trial.begin(stage)
-    for number in range(1 + sum(trial.rng.random() < 0.25 for _ in range(MOST_KILLS - 1))):
+    """Kill a worker and its group up to three times in a row, then let it end."""
+    stage = trial.draw_stage()
+    for number in range(1 + trial.chance(0.25) + trial.chance(0.25)):
         moment = trial.moment(stage, writing)
         trial.where += f", {moment}"
         trial.struck += start_job(trial.place, moment, **trial.undisturbed.job(stage, resumed=number > 0)).strike()
@@ -100,128 +110,265 @@ def killed(trial: KillTrial, writing: bool) -> None:
 
 
 def command(trial: KillTrial) -> None:
-    """The worker's own command as Blender starts it, killed while it imports, works or ends."""
-    stage = trial.stage()
-    trial.begin(stage)
+    """Kill the worker's command, begun as Blender begins it, while it imports, works or ends."""
+    stage = trial.draw_stage()
     capture, after = capture_at(trial.place), trial.rng.uniform(0, 4 + trial.undisturbed.seconds[stage])
     trial.where += f", after {after:.3f} s"
-    worker = Worker(
-        Path(sys.executable), ROOT, write_job(capture, **trial.undisturbed.job(stage)), capture.logs / "worker.log"
-    )
-    worker.start()
-    deadline = time.monotonic() + after
-    while worker.running and time.monotonic() < deadline:
+    job = write_job(capture, **trial.undisturbed.job(stage))
+    worker = Worker(Path(sys.executable), ROOT, job, capture.logs / "worker.log")
+
+    def over() -> bool:
         worker.poll()
-        time.sleep(0.001)
+        return not worker.running
+
+    worker.start()
+    wait_until(over, after)
     trial.struck += worker.running
     worker.terminate()
-    while worker.running:
-        worker.poll()
-        time.sleep(0.001)
+    wait_until(over, float("inf"))
     trial.judge_kill()
     trial.resume(stage)
 
 
 def full(trial: KillTrial) -> None:
-    """The disk is full at a random byte of what a stage writes; then there is room again. Without disks of our own: no
-    file may be longer than some size."""
-    stage = trial.stage()
-    again, share = trial.rng.random() < 0.5, trial.rng.random()
-    base, sizes = trial.undisturbed.base(stage, again), _sizes(trial.undisturbed.end.root, stage)
-    told = trial.place.with_name(f"{trial.place.name}.told")
+    """Fill the disk at a random byte of what a stage writes, then give room again.
+
+    Without disks of their own, limit the size of a file instead.
+    """
+    place, stage = trial.place, trial.rng.choice(trial.undisturbed.names)
+    again, share, end = trial.chance(), trial.rng.random(), trial.undisturbed.end
+    sizes = [(end.root / name).stat().st_size for name in written(end, stages.by_name(stage))]
+    room = int(share * (SPARE * sum(sizes) if trial.private else max(sizes)))
+    base = trial.undisturbed.base(stage, again)
     if trial.private:
-        trial.place.mkdir()
-        disk.mount(trial.place, ROOM)
-    shutil.copytree(base, trial.place, symlinks=True, dirs_exist_ok=True)
-    job = write_job(capture_at(trial.place), **trial.undisturbed.job(stage))
+        place.mkdir()
+        disk.mount(place, ROOM)
+    shutil.copytree(base, place, symlinks=True, dirs_exist_ok=True)
+    job = write_job(capture_at(place), **trial.undisturbed.job(stage))
     if trial.private:
-        room = int(share * SPARE * sum(sizes))
-        used = sum(-(-path.stat().st_size // PAGE) * PAGE for path in trial.place.rglob("*") if path.is_file())
-        disk.resize(trial.place, used + 2 * PAGE + room)
-    else:
-        room = int(share * max(sizes))
+        pages = sum(-(-path.stat().st_size // PAGE) for path in place.rglob("*") if path.is_file())
+        disk.resize(place, (pages + 2) * PAGE + room)
     trial.where = f"{stage}{' again' if again else ''}, {room} bytes {'free' if trial.private else 'in a file'}"
-    ended = fork_worker(job, told, most_bytes=None if trial.private else room).wait()
+    ended = fork_worker(job, trial.beside("told"), most_bytes=None if trial.private else room).wait()
     trial.struck += isinstance(ended, Failed)
     words = "disk is full" if trial.private else "could not be written"
-    if not isinstance(ended, Failed | Done):
-        trial.fault("the worker ended without a word")
-    elif isinstance(ended, Failed) and words not in ended.problem:
-        trial.fault(f"a full disk is told as {ended.problem!r}")
+    named = isinstance(ended, Done) or isinstance(ended, Failed) and words in ended.problem
+    trial.check(named, f"on a full disk the worker ended with {ended}")
     trial.judge_kill()
     if trial.private:
-        disk.resize(trial.place, ROOM)
+        disk.resize(place, ROOM)
     trial.resume(stage)
-
-
-def _sizes(root: Path, stage: str) -> list[int]:
-    """Of the files that a stage writes."""
-    return [(root / name).stat().st_size for name in same_maps.written(Capture(root), stages.by_name(stage))]
 
 
 def asleep(trial: KillTrial) -> None:
-    """A worker is stopped, a second one takes its place after the lease's term, and the first one awakes, meanwhile or
-    afterwards: it changes nothing."""
-    stage = trial.stage()
-    trial.begin(stage)
-    moment, meanwhile = trial.moment(stage, writing=False), trial.rng.random() < 0.5
+    """Stop a worker, let a second one take its place after the lease's term, and wake the first: it changes nothing."""
+    stage = trial.draw_stage()
+    moment, meanwhile = trial.moment(stage, writing=False), trial.chance()
     trial.where += f", stopped {moment}, awakes {'meanwhile' if meanwhile else 'afterwards'}"
-    first = start_job(trial.place, moment, limits={"term_s": SHORT_TERM_S}, **trial.undisturbed.job(stage))
-    if not first.strike(signal.SIGSTOP):
-        trial.resume(stage)
-        return
-    trial.struck += 1
-    capture = capture_at(trial.place)
-    second = fork_worker(
-        capture.job, trial.place.with_name(f"{trial.place.name}.second"), Moment(write=10**9), term_s=SHORT_TERM_S
-    )
-    if meanwhile:
-        wait_until(lambda: second.pid == _holder(capture.lock) or second.ended())
-        time.sleep(trial.rng.uniform(0, trial.undisturbed.seconds[stage]))
-        first.send(signal.SIGCONT)
-    ended = second.wait()
-    if not isinstance(ended, Done):
-        trial.fault(f"the second worker did not end well: {ended}")
-    before = judge.tree(capture.root)
-    if not meanwhile:
-        first.send(signal.SIGCONT)
-    awake = first.wait()
-    changed = {name for name, digest in judge.tree(capture.root).items() if before.get(name) != digest} - {
-        "written.jsonl",
-        f"logs/{stage}.log",
-    }
-    if changed:
-        trial.fault(f"the first worker changed {', '.join(sorted(changed))} after it had been replaced")
-    if not isinstance(awake, Failed | Done) or isinstance(awake, Failed) and "nother worker" not in awake.problem:
-        trial.fault(f"the first worker ended with {awake}")
+    first = start_job(trial.place, moment, SHORT_TERM_S, **trial.undisturbed.job(stage))
+    if first.strike(signal.SIGSTOP):
+        trial.struck += 1
+        capture = capture_at(trial.place)
+        second = fork_worker(capture.job, trial.beside("second"), term_s=SHORT_TERM_S)
+        if meanwhile:
+            wait_until(lambda: second.pid == _holder(capture.lock) or second.ended(), 10 * SHORT_TERM_S)
+            time.sleep(trial.rng.uniform(0, trial.undisturbed.seconds[stage]))
+            first.send(signal.SIGCONT)
+        ended = second.wait()
+        trial.check(isinstance(ended, Done), f"the second worker did not end well: {ended}")
+        before = judge.tree(capture.root)
+        if not meanwhile:
+            first.send(signal.SIGCONT)
+        awake = first.wait()
+        changed = {name for name, digest in judge.tree(capture.root).items() if before.get(name) != digest}
+        changed -= {"written.jsonl", f"logs/{stage}.log"}
+        trial.check(not changed, f"the first worker changed {', '.join(sorted(changed))} after it was replaced")
+        refused = isinstance(awake, Failed) and "nother worker" in awake.problem
+        trial.check(refused or isinstance(awake, Done), f"the first worker ended with {awake}")
     trial.resume(stage)
 
 
+def at_once(trial: KillTrial) -> None:
+    """Start two workers at one job: one does it; the other is refused by name, or comes late and finds it done."""
+    stage = trial.draw_stage()
+    job = write_job(capture_at(trial.place), **trial.undisturbed.job(stage))
+    workers = [fork_worker(job, trial.beside(name)) for name in ("first", "second")]
+    ends = [worker.wait() for worker in workers]
+    refused = sum(isinstance(end, Failed) and end.problem.startswith("Another worker") for end in ends)
+    done = sum(isinstance(end, Done) for end in ends)
+    trial.struck += refused
+    trial.check(done and done + refused == 2, f"two at once ended with {ends}")
+    trial.judge_kill()
+    trial.resume(stage)
+
+
+def saving(trial: KillTrial) -> None:
+    """Kill the add-on while it saves a mask several times, in half of the trials beside a worker.
+
+    The mask is the old one or one of the new, and the old one is in the history where it was replaced.
+    """
+    # no mask is an input of these stages
+    early = trial.undisturbed.names[: stages.NAMES.index(stages.MASK_STAGE) + 1]
+    stage, which, busy = trial.rng.choice(early), trial.rng.choice(list(MASKS)), trial.chance()
+    copy_place(trial.undisturbed.folder / "end", trial.place)
+    capture, name, painted = capture_at(trial.place), MASKS[which], trial.beside("painted")
+    mask = capture.root / name
+    old = mask.read_bytes()
+    moment = Moment(write=trial.rng.randint(1, SAVE_CHANGES), late_s=trial.rng.choice((0.0, trial.rng.random() / 100)))
+    trial.where = f"{which.lower()} mask, {moment}{f', while {stage} is run' if busy else ''}"
+    seed = trial.rng.randrange(2**31)
+    addon = Forked(lambda: _save_masks(capture.root, which, seed, painted), trial.place, trial.beside("addon"), moment)
+    if busy:
+        wait_until(lambda: painted.is_dir() or addon.ended(), 60)
+        worker = start_job(trial.place, **trial.undisturbed.job(stage))
+    trial.struck += addon.strike()
+    trial.check(addon.code <= 0, f"the add-on could not save: {addon.errors[-400:]}")
+    contents = (old, *(path.read_bytes() for path in sorted(painted.glob("*.png"))))
+    masks = {name: contents}
+    if busy:
+        ended = worker.wait()
+        trial.check(isinstance(ended, Done), f"the worker beside the add-on ended with {ended}")
+    else:
+        trial.judge_kill(masks=masks)
+    trial.resume(stage, masks=masks)
+    kept = [path.read_bytes() for path in capture.mask_history.glob("*.png")]
+    trial.check(mask.read_bytes() == old or old in kept, "the mask that was there before is not in the history")
+    trial.check(all(content in contents for content in kept), "the history has an incomplete mask")
+
+
+def _save_masks(root: Path, mask_kind: str, seed: int, painted: Path) -> None:
+    """Save masks as the add-on does after strokes; copies of what the files must hold go to `painted` first."""
+    import numpy as np
+
+    spec = spec_from_file_location("wildcap", ROOT / "__init__.py", submodule_search_locations=[str(ROOT)])
+    sys.modules["wildcap"] = module_from_spec(spec)
+    spec.loader.exec_module(sys.modules["wildcap"])
+    keeping = importlib.import_module("wildcap.wildcap_addon.paint.keeping")
+    mask_image = importlib.import_module("wildcap.wildcap_addon.paint.mask_image")
+    capture = importlib.import_module("wildcap.core.capture.capture").Capture(root)
+    rng, half = np.random.default_rng(seed), painted.with_suffix(".half")
+    masks = [rng.random((MASK_SIDE, MASK_SIDE), np.float32) for _ in range(SAVES)]
+    half.mkdir()
+    for number, mask in enumerate(masks):
+        (half / f"{number}.png").write_bytes(mask_image.grey_png(mask))
+    half.rename(painted)
+    stamp = ()
+    for mask in masks:
+        stamp = keeping.store_painting(mask, capture, mask_kind, stamp)
+
+
+def delivering(trial: KillTrial) -> None:
+    """Kill a delivery over an older one up to twice, then make it: the folder holds one of the two, whole."""
+    base = trial.undisturbed.delivered()
+    copy_place(base, trial.place)
+    beside, writing = trial.chance(), trial.chance(0.7)
+    places = trial.place, base, base.with_name("delivered_again")
+    target, earlier, new = (delivery_folders(place)[beside] for place in places)
+    job, whole = trial.undisturbed.delivery_job(trial.place, target, DELIVERY), (_delivery(earlier), _delivery(new))
+    trial.where = "beside the capture" if beside else "in the capture"
+    for _ in range(1 + trial.chance(0.3)):
+        moment = trial.moment("deliver", writing)
+        trial.where += f", {moment}"
+        trial.struck += start_job(trial.place, moment, **job).strike()
+        trial.judge_kill(unlike=("exports/",))
+        known = not target.is_dir() or _delivery(target) in whole
+        trial.check(known, "after the kill: the delivery is neither the old nor the new one")
+        trial.faults += [f"after the kill: {fault}" for fault in _gone(target, target.with_name(f".{target.name}.old"))]
+    ended = start_job(trial.place, **job).wait()
+    trial.check(isinstance(ended, Done), f"the delivery did not end well: {ended}")
+    trial.check(_delivery(target) == whole[1], "the delivery is not as the undisturbed one")
+    trial.faults += _gone(target)
+    trial.judge_end(trial.undisturbed.names[-1], unlike=("exports/",))
+
+
+def _gone(*folders: Path) -> list[str]:
+    """Find the user's files that lie unchanged in none of these folders of a delivery."""
+    return [
+        f"the user's {name} in the delivery is gone"
+        for name, content in GUESTS.items()
+        if not any((folder / name).is_file() and (folder / name).read_bytes() == content for folder in folders)
+    ]
+
+
+def _delivery(target: Path) -> dict[str, str]:
+    """Return the content hashes of a delivery without the user's files; of provenance, which holds times, the keys."""
+    found = {name: digest for name, digest in judge.tree(target).items() if name not in GUESTS}
+    if PROVENANCE in found:
+        found[PROVENANCE] = ",".join(sorted(json.loads((target / PROVENANCE).read_text(encoding="utf-8"))))
+    return found
+
+
+def colmap(trial: KillTrial) -> None:
+    """Kill COLMAP's process while it places the cameras, or the worker's alone, or both: the next run finds cameras."""
+    copy_place(trial.undisturbed.base("cameras", again=trial.chance()), trial.place)
+    victim, after = trial.rng.choice(("COLMAP", "worker", "both")), trial.rng.uniform(0, COLMAP_S)
+    trial.where = f"{victim}, {after:.3f} s after COLMAP's start"
+    job = trial.undisturbed.job("cameras", cameras={})
+    worker = start_job(trial.place, **job)
+    wait_until(lambda: running_at(trial.place) or worker.ended(), 60)
+    time.sleep(after)
+    running = running_at(trial.place)
+    if running and not worker.ended():
+        trial.struck += 1
+        for pid in {"COLMAP": running, "worker": [worker.pid], "both": [*running, worker.pid]}[victim]:
+            os.kill(pid, signal.SIGKILL)
+    ended = worker.wait()
+    named = isinstance(ended, Done) or isinstance(ended, Failed) and "camera solver stopped" in ended.problem
+    trial.check(named or not running or victim != "COLMAP", f"the worker without its COLMAP ended with {ended}")
+    wait_until(lambda: not running_at(trial.place), PARTING_S)
+    trial.faults += [f"process {pid} outlived its worker" for pid in running_at(trial.place)]
+    unlike = ("cameras/", "report/cameras")
+    trial.judge_kill(unlike=unlike)
+    ended = start_job(trial.place, **{**job, "first": None}).wait()
+    trial.check(
+        isinstance(ended, Done) and _placed(trial.place) >= 3, f"the resumed run ended without cameras: {ended}"
+    )
+    trial.judge_end("cameras", unlike=unlike, unlike_stages=("cameras",))
+
+
+def _placed(place: Path) -> int:
+    """Return the number of frames with a camera."""
+
+    def count() -> int:
+        from core.geometry.models import read_model
+
+        return read_model(capture_at(place).cameras).num_reg_images()
+
+    return in_fork(count)
+
+
+def wait_until(true: Callable[[], object], limit_s: float) -> None:
+    """Return when `true` is, or when the time is over."""
+    deadline = time.monotonic() + limit_s
+    while not true() and time.monotonic() < deadline:
+        time.sleep(0.002)
+
+
 def _holder(lock: Path) -> int | None:
+    """Return the process that holds a lock, if any."""
     try:
         return json.loads(lock.read_text(encoding="utf-8"))["pid"]
     except (OSError, ValueError, KeyError):
         return None
 
 
-def wait_until(true: Callable[[], object], limit_s: float = 10 * SHORT_TERM_S) -> None:
-    """Return then, or when the time is over."""
-    deadline = time.monotonic() + limit_s
-    while not true() and time.monotonic() < deadline:
-        time.sleep(0.002)
+@dataclass(frozen=True)
+class Kind:
+    """Function of a trial, its number in a round, and the stage up to which the chain must have run."""
+
+    run: Callable[[KillTrial], None]
+    weight: int
+    needs: str = stages.NAMES[0]
 
 
-def at_once(trial: KillTrial) -> None:
-    """Two workers are started at the same job: one does it, the other one is refused by name, or finds it done when it
-    comes late."""
-    stage = trial.stage()
-    trial.begin(stage)
-    job = write_job(capture_at(trial.place), **trial.undisturbed.job(stage))
-    workers = [fork_worker(job, trial.place.with_name(f"{trial.place.name}.{name}")) for name in ("first", "second")]
-    ends = [worker.wait() for worker in workers]
-    refused = [end for end in ends if isinstance(end, Failed) and end.problem.startswith("Another worker")]
-    trial.struck += len(refused)
-    if not any(isinstance(end, Done) for end in ends) or len(refused) + sum(isinstance(end, Done) for end in ends) < 2:
-        trial.fault(f"two at once ended with {ends}")
-    trial.judge_kill()
-    trial.resume(stage)
+KINDS = {
+    "moment": Kind(partial(killed, writing=False), 12),
+    "write": Kind(partial(killed, writing=True), 12),
+    "command": Kind(command, 2),
+    "mask": Kind(saving, 6),
+    "deliver": Kind(delivering, 6, stages.NAMES[-1]),
+    "full": Kind(full, 4),
+    "asleep": Kind(asleep, 4),
+    "at_once": Kind(at_once, 2),
+    "colmap": Kind(colmap, 4, "cameras"),
+}

@@ -1,28 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an in-the-wild capture loses to a controlled one, and what the solve adds to a studio's even light: the same
-people, their true albedo known.
+"""Measure what an in-the-wild capture loses to a controlled one, and what the solve adds to even light.
 
     python -m research.benchmarks.light.controlled FOLDER [--only NAME ...] [--json OUT.json]
 
-FOLDER was made by research/benchmarks/captures/people.py (--places wild flash studio) and its wild captures are solved.
-Rows, each an albedo map in the same UVs:
-  wild              the chain's own
-  wild_texture      its texture taken for the albedo
-  flash             dark room, lamp at the camera: the known light divided out (flash_light.py), solved over the same
-                    prior with that light held
-  flash_texture     the same, before the solve
-  limit             the true albedo frames as a texture: what geometry and texture leave
-  studio            sixteen cameras in even light, no delighter, empty mask, solved by the stage
-  studio_texture    its texture taken for the albedo
-All are scored in the wild capture's frames that have a truth; all share head, prior, quality and true skin tone.
-FOLDER/controlled keeps maps and figures, so that a second run goes on where the first stopped. A set that has not been
-made is left out; what OUT.json has and FOLDER has not stays in it.
+FOLDER was made by research/benchmarks/captures/people.py (--places wild flash studio); its wild captures are solved.
+Rows are albedo maps in the same UVs: the wild capture's and its texture; of the dark room with a lamp at the camera,
+the frames over the known light (flash_light.py), as texture and solved with that light held; *limit*, the true albedo
+frames as a texture; of sixteen cameras in even light, without delighter or mask, as texture and solved by the stage.
+All share head, prior, quality and true skin tone, and are scored in the wild capture's frames that have a truth.
+FOLDER/controlled keeps maps and figures, so a second run goes on where the first stopped. Missing sets are left out;
+what OUT.json has and FOLDER has not stays in it.
 """
 
-from __future__ import annotations
-
-import argparse
 import json
 import sys
 from collections.abc import Callable
@@ -61,12 +51,16 @@ COLUMNS = {
     "mole_contrast": ("mole contrast", 2),
 }
 
+GAP_HEAD = ["dB after one gain", "in the wild", "flash", "true frames", "gap to flash"]
+GAP_HEAD += [f"moles, {place}" for place in ("in the wild", "flash", "true frames")]
+STUDIO_HEAD = ["dB after one gain", "texture", "solved", "the solve adds", "detail, texture", "detail, solved"]
+STUDIO_HEAD += ["proposed mask, % of the face", "seconds"]
+
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "controlled")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     folder = options.folder.resolve()
     if not folder.is_dir():
@@ -74,74 +68,61 @@ def main() -> int:
     found = {name: rows for name in options.only if (rows := measure(folder, name))}
     if not found:
         parser.error(f"{folder} holds no capture of research/benchmarks/captures/people.py.")
-    known = (
-        figures.read_record(options.json.stem, options.json.parent)["figures"]["people"]
-        if options.json and options.json.exists()
-        else {}
-    )
+    known = figures.read_figures(options.json).get("people", {})
     everyone = figures.merged(known, found)
     people = {p.name: everyone[p.name] for p in PEOPLE if p.name in everyone}
     summary = {"people": people, "mean": means(people)}
-    if options.json:
-        figures.write_record(options.json, "controlled", COMMAND, summary)
+    figures.write_record(options.json, "controlled", COMMAND, summary)
     print(table(summary))
     return 0
 
 
 def measure(folder: Path, name: str) -> dict[str, dict]:
-    """Row -> figures of one person; rows whose capture is missing are left out, with a line that says so."""
+    """Return row -> figures of one person; rows whose capture is missing are left out, and named."""
     wild, truth, kept = Capture(folder / f"{name}.wildcap"), folder / name, folder / "controlled" / name
     if not (truth / "skin_tone.txt").is_file():
         return {}
     settings = from_json({"solve": {"skin_tone": skin_tone(truth)}}, preset("standard"))
-    sets = {
-        "wild": Capture(kept / "limit.wildcap"),
-        "flash": Capture(kept / "flash.wildcap"),
-        "studio": Capture(kept / "studio.wildcap"),
-    }
+    solved = wild.maps / "diffuse_albedo.png"
+
+    def of(place: str) -> Capture:
+        """Return the person's capture at a place, up to its texture."""
+        work = Capture(kept / f"{place}.wildcap")
+        if place == "limit":
+            return use_true_frames(wild, truth, work, settings)
+        return {"flash": flash, "studio": studio}[place](_set(folder, name, place), work, settings)
+
     makers: dict[str, tuple[str, Callable[[], tuple[np.ndarray, dict]]]] = {
         "wild_texture": ("solved", lambda: (as_albedo(wild, settings), {})),
-        "wild": ("solved", lambda: (images.read_srgb(wild.maps / "diffuse_albedo.png"), {})),
-        "flash_texture": (
-            "flash",
-            lambda: (as_albedo(flash(_set(folder, name, "flash"), sets["flash"], settings), settings), {}),
-        ),
-        "flash": (
-            "flash",
-            lambda: under_even_light(flash(_set(folder, name, "flash"), sets["flash"], settings), settings),
-        ),
-        "studio_texture": (
-            "studio",
-            lambda: (as_albedo(studio(_set(folder, name, "studio"), sets["studio"], settings), settings), {}),
-        ),
-        "studio": (
-            "studio",
-            lambda: by_the_stage(studio(_set(folder, name, "studio"), sets["studio"], settings), settings),
-        ),
-        "limit": ("wild", lambda: (as_albedo(use_true_frames(wild, truth, sets["wild"], settings), settings), {})),
+        "wild": ("solved", lambda: (images.read_srgb(solved), {})),
+        "flash_texture": ("flash", lambda: (as_albedo(of("flash"), settings), {})),
+        "flash": ("flash", lambda: under_even_light(of("flash"), settings)),
+        "studio_texture": ("studio", lambda: (as_albedo(of("studio"), settings), {})),
+        "studio": ("studio", lambda: by_the_stage(of("studio"), settings)),
+        "limit": ("wild", lambda: (as_albedo(of("limit"), settings), {})),
     }
-    there = {
-        "wild": True,
-        "solved": (wild.maps / "diffuse_albedo.png").is_file(),
-        **{place: (folder / f"{name}_{place}" / "skin_tone.txt").is_file() for place in ("flash", "studio")},
-    }
+    there = {place: (folder / f"{name}_{place}" / "skin_tone.txt").is_file() for place in ("flash", "studio")}
+    there |= {"wild": True, "solved": solved.is_file()}
     for place in (place for place, is_there in there.items() if not is_there):
         print(f"{name}: {place} is not there and is left out.", file=sys.stderr, flush=True)
     rows = {}
     for row, (place, make) in makers.items():
         if not there[place]:
             continue
-        if not (kept / f"{row}.json").is_file():
+        path = kept / f"{row}.json"
+        if not path.is_file():
             albedo, more = make()
             images.write_srgb(kept / f"{row}.png", albedo, bits=16)
-            write_json(kept / f"{row}.json", {**_rounded(score(albedo, _looks(wild.root, truth))), **more})
+            scores = score(albedo, _looks(wild.root, truth))
+            rounded = {key: round(value, 4) if isinstance(value, float) else value for key, value in scores.items()}
+            write_json(path, {**rounded, **more})
             print(f"{name}: {row}", file=sys.stderr, flush=True)
-        rows[row] = json.loads((kept / f"{row}.json").read_text(encoding="utf-8"))
+        rows[row] = json.loads(path.read_text(encoding="utf-8"))
     return rows
 
 
 def means(rows_of_people: dict[str, dict]) -> dict[str, dict]:
-    """Row -> figure -> mean over the people that have all rows of the same table."""
+    """Return row -> figure -> mean over the people that have all rows of the same table."""
     out = {}
     for table_rows in (GAP, STUDIO):
         people = whole(rows_of_people, table_rows)
@@ -158,85 +139,45 @@ def means(rows_of_people: dict[str, dict]) -> dict[str, dict]:
 
 
 def whole(rows_of_people: dict[str, dict], table_rows: dict) -> list[dict]:
-    """Return the people whose rows of one table are all there."""
+    """Return the people who have all rows of one table."""
     return [rows for rows in rows_of_people.values() if {*table_rows} <= {*rows}]
 
 
 def table(record: dict) -> str:
-    """Markdown: the means of the gap to a controlled capture and of the studio, then both per person."""
+    """Return Markdown: the means of both tables, then both per person."""
     mean, everyone = record["mean"], {**record["people"], "mean": record["mean"]}
+
+    def cells(rows: dict, names: tuple[str, ...], figure: str) -> list[str | None]:
+        return [figures.number(rows[name].get(figure), 2) for name in names]
+
+    def gain(rows: dict, one: str, other: str) -> str:
+        return f"{rows[one]['psnr_after_gain'] - rows[other]['psnr_after_gain']:+.2f}"
+
     parts = []
-    for rows in (GAP, STUDIO):
-        head = [f"mean of {len(whole(record['people'], rows))} people", *(label for label, _ in COLUMNS.values())]
+    for table_rows in (GAP, STUDIO):
+        head = [f"mean of {len(whole(record['people'], table_rows))} people", *(label for label, _ in COLUMNS.values())]
+        found = {label: mean[row] for row, label in table_rows.items() if row in mean}
+        columns = [(figure, digits) for figure, (_, digits) in COLUMNS.items()]
         parts.append(
-            (
-                head,
-                [
-                    [label, *(figures.number(mean[row].get(figure), digits) for figure, (_, digits) in COLUMNS.items())]
-                    for row, label in rows.items()
-                    if row in mean
-                ],
-            )
+            (head, [[label, *(figures.number(row.get(f), d) for f, d in columns)] for label, row in found.items()])
         )
-    three = ("wild", "flash", "limit")
-    head = [
-        "dB after one gain",
-        "in the wild",
-        "flash",
-        "true frames",
-        "gap to flash",
-        "moles, in the wild",
-        "moles, flash",
-        "moles, true frames",
-    ]
-    parts.append(
-        (
-            head,
-            [
-                [
-                    name.replace("_", " "),
-                    *(figures.number(rows[row]["psnr_after_gain"], 2) for row in three),
-                    f"{rows['flash']['psnr_after_gain'] - rows['wild']['psnr_after_gain']:+.2f}",
-                    *(figures.number(rows[row].get("mole_contrast"), 2) for row in three),
-                ]
-                for name, rows in everyone.items()
-                if {*three} <= {*rows}
-            ],
-        )
-    )
-    head = [
-        "dB after one gain",
-        "texture",
-        "solved",
-        "the solve adds",
-        "detail, texture",
-        "detail, solved",
-        "proposed mask, % of the face",
-        "seconds",
-    ]
-    parts.append(
-        (
-            head,
-            [
-                [
-                    name.replace("_", " "),
-                    *(figures.number(rows[row]["psnr_after_gain"], 2) for row in STUDIO),
-                    f"{rows['studio']['psnr_after_gain'] - rows['studio_texture']['psnr_after_gain']:+.2f}",
-                    *(figures.number(rows[row]["detail"], 2) for row in STUDIO),
-                    figures.number(rows["studio"]["proposed_mask_percent"], 2),
-                    figures.number(rows["studio"]["seconds"], 0),
-                ]
-                for name, rows in everyone.items()
-                if {*STUDIO} <= {*rows}
-            ],
-        )
-    )
+    wild, even = ("wild", "flash", "limit"), ("studio_texture", "studio")
+    gap, added = [], []
+    for name, rows in everyone.items():
+        name = name.replace("_", " ")
+        if {*wild} <= {*rows}:
+            moles = cells(rows, wild, "mole_contrast")
+            gap.append([name, *cells(rows, wild, "psnr_after_gain"), gain(rows, "flash", "wild"), *moles])
+        if {*even} <= {*rows}:
+            seconds = figures.number(rows["studio"]["seconds"], 0)
+            more = [*cells(rows, even, "detail"), *cells(rows, even[1:], "proposed_mask_percent"), seconds]
+            added.append([name, *cells(rows, even, "psnr_after_gain"), gain(rows, *even[::-1]), *more])
+    parts += [(GAP_HEAD, gap), (STUDIO_HEAD, added)]
     return "\n\n".join(figures.markdown(head, lines) for head, lines in parts if lines)
 
 
 def _set(folder: Path, name: str, place: str) -> Capture:
-    """Return the person's capture at a place. Raises Problem where its head is not the wild capture's, in whose frames
-    all is scored."""
+    """Return the person's capture at a place. Raises Problem if its head is not the wild capture's."""
     capture = Capture(folder / f"{name}_{place}.wildcap")
     if capture.head.read_bytes() != (folder / f"{name}.wildcap" / "head.obj").read_bytes():
         raise Problem(
@@ -249,10 +190,6 @@ def _set(folder: Path, name: str, place: str) -> Capture:
 @cache
 def _looks(capture: Path, truth: Path) -> list:
     return list(looks_of(Capture(capture), read_head(Capture(capture)).caster, truth).values())
-
-
-def _rounded(scores: dict) -> dict:
-    return {name: round(value, 4) if isinstance(value, float) else value for name, value in scores.items()}
 
 
 if __name__ == "__main__":

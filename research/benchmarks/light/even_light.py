@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of its albedo skin gives back under even light in Cycles: a sphere as large as a head, of six tones, without
-gloss.
+"""Render spheres of six skin tones under even light in Cycles, and measure how much of the albedo comes back.
 
     python -m research.benchmarks.light.even_light [--json OUT.json]
 
@@ -9,9 +8,6 @@ Rendered in Blender's Python module with the node group WildCap Skin as it comes
 and the albedo as the Base Color. 1 is all of it: what a capture measured as albedo is what a renderer then shows.
 """
 
-from __future__ import annotations
-
-import argparse
 import sys
 import tempfile
 from pathlib import Path
@@ -32,36 +28,23 @@ TONES = {
 """Linear albedo of skin of the six groups of ITA, rounded (research/benchmarks/delighting/skin_tone.py has the
 groups)."""
 WAYS = ("random walk", "random walk (skin)", "WildCap Skin")
-WORDS = """Red, green and blue light from the middle of a sphere as large as a head over its albedo, in Cycles, under
-even light from everywhere and without gloss: 1 is all of it. *Random walk*: Cycles's method of that name,
-which the material had in 0.1.0, with the albedo as the Base Color. *Random walk (skin)*: the other one.
-*WildCap Skin*: the material as it is, which multiplies the albedo by what the second one loses in the mean
-over the tones, as far as *Subsurface* is on; the map itself stays as it was measured."""
 RADIUS_M, SEEN_M = 0.09, 0.012
-"""The sphere's radius and the side of what is seen of it: Cycles takes scattering that is shorter than a pixel for
+"""Sphere's radius and the side of what is seen of it: Cycles takes scattering that is shorter than a pixel for
 none."""
 SIDE, SAMPLES = 32, 256
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, metavar="OUT.json")
-    arguments = parser.parse_args()
+    parser = figures.command_line(__doc__, "even_light")
+    options = parser.parse_args()
+    colours = ("red", "green", "blue")
     with extension():
         found = {
-            way: {
-                tone: dict(zip(("red", "green", "blue"), given_back(way, albedo), strict=True))
-                for tone, albedo in TONES.items()
-            }
+            way: {tone: dict(zip(colours, given_back(way, albedo), strict=True)) for tone, albedo in TONES.items()}
             for way in WAYS
         }
-    if arguments.json:
-        figures.write_record(
-            arguments.json,
-            "even_light",
-            f"python -m research.benchmarks.light.even_light --json {arguments.json}",
-            found,
-        )
+    command = f"python -m research.benchmarks.light.even_light --json {options.json}"
+    figures.write_record(options.json, "even_light", command, found)
     print(table(found))
     return 0
 

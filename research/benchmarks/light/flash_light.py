@@ -1,15 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The known light of a dark room with one lamp at the camera, taken out of the frames: what
-research/benchmarks/light/controlled.py solves a controlled capture from.
+"""Remove the known light of one lamp at the camera in a dark room from the frames.
 
 The lamp is in the camera's own place, so a point at distance r with normal n gets n.l / r^2, and the half vector is the
 viewing direction: the highlight depends on n.l alone. Every point is lit from another side in every frame, so how its
 brightness changes tells the highlight from the albedo: a strength per place and channel over one roughness, by least
 squares. Bounces between nose and cheek are not known light and stay.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,7 +34,10 @@ BRIGHT = 99.0, 0.8  # percentile of the result over the head, and the linear val
 
 @dataclass(frozen=True)
 class Highlight:
-    """strength [S, S, 3]: of the lobe of that roughness, in units of the shading-free picture, in the head's UVs."""
+    """A highlight.
+
+    strength [S, S, 3]: of the lobe of that roughness, in units of the shading-free picture, in the head's UVs.
+    """
 
     strength: np.ndarray
     roughness: float
@@ -45,8 +45,10 @@ class Highlight:
 
 @dataclass(frozen=True)
 class Lit:
-    """One frame and its light. linear [H, W, 3]; per pixel hit bool [H, W], cosine n.l [H, W], shading [H, W] (n.l /
-    r^2, r in metres), uv [H, W, 2]."""
+    """One frame and its light.
+
+    linear [H, W, 3]; hit: bool [H, W]; cosine n.l [H, W]; shading n.l / r^2 [H, W], r in metres; uv [H, W, 2].
+    """
 
     view: View
     linear: np.ndarray
@@ -57,14 +59,12 @@ class Lit:
 
     @property
     def unshaded(self) -> np.ndarray:
-        """[H, W, 3]: the picture over its shading, zero beside the head: albedo and highlight, times one unknown
-        gain."""
+        """Return the picture over its shading [H, W, 3]: albedo and highlight times an unknown gain; 0 off the head."""
         return np.where(self.hit[..., None], self.linear / self.shading[..., None], 0).astype(np.float32)
 
 
 def write_delit(capture: Capture, folder: Path) -> Highlight:
-    """folder/NNNNN.png of every registered frame of a capture with a lamp at the camera: sRGB, 16 bit, without the
-    known light, all in one exposure."""
+    """Write folder/NNNNN.png of every registered frame without the known light: sRGB, 16 bit, one exposure."""
     head = read_head(capture)
     frames = [lit(view, images.read_linear(view.path), head) for view in read_views(capture)]
     found = highlight(frames, head.unfold(SIZE))
@@ -79,7 +79,7 @@ def write_delit(capture: Capture, folder: Path) -> Highlight:
 
 
 def lit(view: View, linear: np.ndarray, head: Head) -> Lit:
-    """Return a frame, linear [H, W, 3], of the size of its view, with the light of a lamp at the camera on the head."""
+    """Return a frame, linear [H, W, 3], with the light of a lamp at the camera on the head."""
     face, bary, distance = raster.render_view(head.caster, view)
     mesh, hit = head.mesh, face >= 0
     normal = raster.interpolate(head.normals, mesh.faces, face, bary)
@@ -92,10 +92,12 @@ def lit(view: View, linear: np.ndarray, head: Head) -> Lit:
 
 
 def highlight(frames: list[Lit], surface: Unfolded) -> Highlight:
-    """Least squares over the frames at every texel: picture over shading = albedo + strength x lobe(n.l), neighbours
-    sharing the strength; of all ROUGHNESSES the one that leaves least."""
-    seen = [_observed(frame, surface) for frame in frames]
-    fits = [_fit(seen, roughness) for roughness in ROUGHNESSES]
+    """Fit picture over shading = albedo + strength x lobe(n.l) at every texel by least squares over the frames.
+
+    Neighbours share the strength; the roughness of ROUGHNESSES with the least residual is taken.
+    """
+    samples = [_observed(frame, surface) for frame in frames]
+    fits = [_fit(samples, roughness) for roughness in ROUGHNESSES]
     best = min(range(len(fits)), key=lambda i: fits[i][1])
     return Highlight(fits[best][0], ROUGHNESSES[best])
 
@@ -110,9 +112,10 @@ def matte(frame: Lit, highlight: Highlight) -> np.ndarray:
 
 
 def lobe(cosine: np.ndarray, roughness: float) -> np.ndarray:
-    """Return the GGX highlight under a lamp at the camera over a white diffuse surface's brightness, for a normal
-    reflectance F0 of 1: D G2 pi / (4 c^2), [...] (Walter et al. 2007; h = l = v, so Fresnel's term is constant and the
-    strength of a real surface is F0 itself)."""
+    """Return the GGX highlight under a lamp at the camera over a white diffuse surface, for F0 = 1: D G2 pi / (4 c^2).
+
+    Walter et al. 2007; h = l = v, so Fresnel's term is constant and the strength of a real surface is F0 itself.
+    """
     alpha2, c2 = roughness**4, np.clip(cosine, LEAST, 1) ** 2
     distribution = alpha2 / (np.pi * (c2 * (alpha2 - 1) + 1) ** 2)
     # 1 + 2 Lambda; both directions are one, and their masking is correlated
@@ -121,23 +124,22 @@ def lobe(cosine: np.ndarray, roughness: float) -> np.ndarray:
 
 
 def _observed(frame: Lit, surface: Unfolded) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what a frame shows of each texel: its unshaded colour [S, S, 3], n.l [S, S], and how far that counts [S,
-    S]."""
-    seen = observe(frame.view, hold(frame.unshaded), surface, 1.0)
+    """Return each texel's unshaded colour [S, S, 3] in a frame, n.l [S, S], and its weight [S, S]."""
+    observation = observe(frame.view, hold(frame.unshaded), surface, 1.0)
     burnt = cv2.dilate((images.linear_to_srgb(frame.linear).max(-1) > BURNT).astype(np.uint8), np.ones((5, 5))).astype(
         np.float32
     )
-    weight = seen.quality * (
-        cv2.remap(burnt, seen.pixels[..., 0] - 0.5, seen.pixels[..., 1] - 0.5, cv2.INTER_LINEAR) == 0
+    weight = observation.quality * (
+        cv2.remap(burnt, observation.pixels[..., 0] - 0.5, observation.pixels[..., 1] - 0.5, cv2.INTER_LINEAR) == 0
     )
     towards = frame.view.centre - surface.points
     cosine = np.zeros(surface.covered.shape, np.float32)
     cosine[surface.covered] = np.clip((towards * surface.normals).sum(1) / np.linalg.norm(towards, axis=1), 0, 1)
-    return np.exp(seen.log_colour), cosine, np.where(cosine > LEAST, weight, 0).astype(np.float32)
+    return np.exp(observation.log_colour), cosine, np.where(cosine > LEAST, weight, 0).astype(np.float32)
 
 
 def _fit(samples: list[tuple], roughness: float) -> tuple[np.ndarray, float]:
-    """Return the strength [S, S, 3] for one roughness, and the sum of squares that it leaves."""
+    """Return the strength [S, S, 3] for one roughness, and the residual sum of squares."""
     lobes = [lobe(cosine, roughness)[..., None].astype(np.float32) for _, cosine, _ in samples]
     weights = [weight[..., None] for *_, weight in samples]
     total = sum(weights) + 1e-6

@@ -1,31 +1,19 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Solved heads under new light beside the true subjects under the same light: the number that artists feel.
+"""Compare solved heads under new light with the true subjects under the same light.
 
     python -m research.benchmarks.light.relit WORK [--sample CAPTURE] [--people FOLDER [--only NAME ...]] [--picture
-    docs/pictures/relit.jpg] [--json OUT.json]
+        docs/pictures/relit.jpg] [--json OUT.json]
 
-CAPTURE was solved from research/people/sample, FOLDER was made by research/benchmarks/captures/people.py. Rendered by
-Cycles with the add-on's own material and lights, of which none lit a capture, as linear EXR; both heads are the
-registered one. A picture is exposed so that the true subject's face has the mean luminance MIDDLE (one gain per light,
-the same for all rows), encoded by the sRGB curve and clipped: no AgX. Figures are of the face, each the mean over the
-lights:
-
-    raw, delit                   the filmed or the delit texture for albedo
-    solved                       all three maps as delivered
-    no_relief, even_gloss        solved without the one, with the other; plain: both
-    true_albedo, true_normal, true_specular    solved, with one map swapped for the true one: what that map costs
-    floor                        the truth with other random numbers: what the rendering's noise costs
-
-The true maps are worn where the registered surface lies on the true head (research/benchmarks/light/relit_maps.py). All
-albedos share the truth's mean over confident facial skin. WORK keeps the renders; those that are newer than the maps
-and textures are taken as they are."""
-
-from __future__ import annotations
+CAPTURE was solved from research/people/sample, FOLDER was made by research/benchmarks/captures/people.py. Cycles
+renders with the add-on's own material and lights to linear EXR; both heads are the registered one. The exposure gives
+the true subject's face the mean luminance MIDDLE, one gain per light for all rows; then comes the sRGB curve, clipped.
+Figures are of the face, means over the lights. The true maps are worn where the registered surface lies on the true
+head (research/benchmarks/light/relit_maps.py); all albedos share the truth's mean over confident facial skin. WORK
+keeps the renders; those that are newer than the maps and textures are not made again.
+"""
 
 import argparse
-import os
-import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -43,25 +31,15 @@ from ...people.parameters import sample_parameters
 from ...people.pigment import LUMINANCE
 from ...people.skin import make_skin
 from .. import figures
-from ..captures.people import PEOPLE, write_maps
+from ..captures.people import PEOPLE
+from ..captures.truth_files import write_maps
 from ..head.head_against_truth import pose_of_truth
 from ..measures.pictures import differences, face_box
+from ..measures.table import mean_of
 from .relit_maps import Worn, face_mask, read_rows, read_worn, worn_by, write_row
 from .relit_renders import MARGIN
 
 LIGHTS = ("three_point", "window", "sun", "coloured", "city.exr", "interior.exr")
-ROWS = (
-    "raw",
-    "delit",
-    "solved",
-    "plain",
-    "no_relief",
-    "even_gloss",
-    "true_albedo",
-    "true_normal",
-    "true_specular",
-    "floor",
-)
 LABELS = {
     "raw": "filmed texture as albedo",
     "delit": "delit texture as albedo",
@@ -74,6 +52,7 @@ LABELS = {
     "true_specular": "solved, with the true specular albedo",
     "floor": "the truth, other random numbers",
 }
+ROWS = tuple(LABELS)
 SHOWN = ("truth", "solved", "delit", "raw")
 RESOLUTION, SAMPLES = 320, 16
 MIDDLE = 0.18
@@ -81,51 +60,35 @@ OVER_RAW, OVER_DELIT = 1.0, 0.5  # dB that are asked for
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "relit")
     parser.add_argument("work", type=Path)
     parser.add_argument("--sample", type=Path)
     parser.add_argument("--people", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
-    parser.add_argument(
-        "--picture", type=Path, help="a JPEG of the first subject under all lights: truth, solved, delit, raw"
-    )
-    parser.add_argument("--json", type=Path, help="where the table's figures go, such as research/records/relit.json")
-    parser.add_argument("--lights", nargs="+", default=LIGHTS)
+    parser.add_argument("--picture", type=Path, help="a JPEG of the first subject under all lights")
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS)
-    arguments = parser.parse_args()
-    work, results = arguments.work.resolve(), {}
-    for subject in _subjects(arguments, work):
+    options = parser.parse_args()
+    work, means = options.work.resolve(), {}
+    for subject in _subjects(options, work):
         name = subject.name
-        render_rows(subject, work / name, arguments.lights, arguments.rows)
-        results[name] = score(work / name, arguments.lights, arguments.rows)
-        write_json(work / f"{name}.json", results[name])
-        print(f"{name}: {shortfall(mean_over_lights(results[name])) or 'as asked'}", file=sys.stderr)
-    if arguments.picture and results:
-        images.write_srgb(
-            arguments.picture,
-            side_by_side(
-                [images.read_srgb(work / next(iter(results)) / f"{Path(light).stem}.png") for light in arguments.lights]
-            ),
-            quality=86,
-        )
-    means = {name: mean_over_lights(found) for name, found in results.items()}
+        render_rows(subject, work / name, options.rows)
+        found = score(work / name, LIGHTS, options.rows)
+        write_json(work / f"{name}.json", found)
+        means[name] = mean_over_lights(found)
+        print(f"{name}: {shortfall(means[name]) or 'the goals are met'}", file=sys.stderr)
+    if options.picture and means:
+        pictures = [images.read_srgb(work / next(iter(means)) / f"{Path(light).stem}.png") for light in LIGHTS]
+        images.write_srgb(options.picture, side_by_side(pictures), quality=86)
     print(table(means))
-    if arguments.json:
-        source = (
-            "--sample .demo/sample.wildcap"
-            if arguments.sample
-            else f"--people FOLDER --rows {' '.join(arguments.rows)}"
-        )
-        figures.write_record(
-            arguments.json, "relit", f"python -m research.benchmarks.light.relit WORK {source}", with_mean(means)
-        )
+    source = "--sample .demo/sample.wildcap" if options.sample else f"--people FOLDER --rows {' '.join(options.rows)}"
+    command = f"python -m research.benchmarks.light.relit WORK {source}"
+    figures.write_record(options.json, "relit", command, with_mean(means))
     return 0
 
 
 @dataclass(frozen=True)
 class RelitSubject:
-    """name; capture, solved; maps: the folder of the true ones; truth: where cameras.json lies; seed: whose head it
-    is."""
+    """A solved capture, the folder of the true maps, the folder with cameras.json, and the seed of the head."""
 
     name: str
     capture: Capture
@@ -140,83 +103,58 @@ class RelitSubject:
         return worn_by(self.capture, read_worn(self.maps), head.moved(pose.apply(head.vertices)))
 
 
-def _subjects(arguments: argparse.Namespace, work: Path) -> Iterator[RelitSubject]:
+def _subjects(options: argparse.Namespace, work: Path) -> Iterator[RelitSubject]:
     """Return each subject that was asked for and has been solved."""
-    if arguments.sample:
+    if options.sample:
         maps = work / "sample_truth"
         if not (maps / "normal.png").exists():  # written last
             write_maps(maps, make_skin(sample_parameters(sample.RESERVED["sample"]), sample.MAPS))
         truth = Path(sample.__file__).parent / "sample"
-        yield RelitSubject("sample", Capture(arguments.sample.resolve()), maps, truth, sample.RESERVED["sample"])
-    for person in (p for p in PEOPLE if arguments.people and p.name in arguments.only):
-        capture = Capture(arguments.people.resolve() / f"{person.name}.wildcap")
+        yield RelitSubject("sample", Capture(options.sample.resolve()), maps, truth, sample.RESERVED["sample"])
+    for person in (p for p in PEOPLE if options.people and p.name in options.only):
+        capture = Capture(options.people.resolve() / f"{person.name}.wildcap")
         if (capture.maps / "normal.png").is_file():
-            truth = arguments.people.resolve() / person.name
+            truth = options.people.resolve() / person.name
             yield RelitSubject(person.name, capture, truth / "maps", truth, person.seed)
         else:
             print(f"{person.name} has not been solved and is left out.", file=sys.stderr)
 
 
-def render_rows(subject: RelitSubject, work: Path, lights: list[str], row_names: list[str]) -> None:
-    """Render the pictures that are not newer than what they show.
-
-    subject: with maps of its own and the true ones; row_names: of the rows, besides the truth."""
-    capture, truth = subject.capture, subject.maps
-    renders, mask = work / "renders", work / "mask.png"
+def render_rows(subject: RelitSubject, work: Path, row_names: list[str]) -> None:
+    """Render the truth and rows, unless the pictures are newer than what they show."""
+    capture, renders, mask = subject.capture, work / "renders", work / "mask.png"
     renders.mkdir(parents=True, exist_ok=True)
-    pictures = [
-        renders / name
-        for name in (
-            *(f"{row}_{Path(light).stem}.exr" for row in ("truth", *row_names) for light in lights),
-            "face.exr",
-        )
-    ]
-    old = [picture for picture in pictures if not is_newer(picture, capture, truth)]
+    chosen = ("truth", *row_names)
+    names = ["face.exr", *(f"{row}_{Path(light).stem}.exr" for row in chosen for light in LIGHTS)]
+    old = [renders / name for name in names if not is_newer(renders / name, capture, subject.maps)]
     if not old:
         return
-    for picture in old:  # what is there would be kept
+    for picture in old:  # the renderer keeps existing files
         picture.unlink(missing_ok=True)
     face_mask(mask)
     rows = []
     for name, worn in read_rows(capture, subject.worn()).items():
-        if name not in ("truth", *row_names):
-            continue
-        folder = work / f"{name}.wildcap"
-        write_row(folder, capture, worn)
-        rows.append({"name": name, "capture": str(folder), "seed": int(name == "floor")})
-    write_json(
-        work / "job.json",
-        {
-            "rows": rows,
-            "lights": list(lights),
-            "out": str(renders),
-            "mask": str(mask),
-            "resolution": RESOLUTION,
-            "samples": SAMPLES,
-        },
-    )
-    subprocess.run(
-        [sys.executable, "-m", "research.benchmarks.light.relit_renders", str(work / "job.json")],
-        cwd=figures.ROOT,
-        check=True,
-        stdout=subprocess.DEVNULL,
-    )
+        if name in chosen:
+            folder = work / f"{name}.wildcap"
+            write_row(folder, capture, worn)
+            rows.append({"name": name, "capture": str(folder), "seed": int(name == "floor")})
+    job = {"rows": rows, "lights": LIGHTS, "out": str(renders), "mask": str(mask)}
+    write_json(work / "job.json", {**job, "resolution": RESOLUTION, "samples": SAMPLES})
+    if figures.run_python("research.benchmarks.light.relit_renders", work / "job.json", quiet=True):
+        raise SystemExit("The renders failed.")
 
 
 def is_newer(picture: Path, capture: Capture, truth: Path) -> bool:
-    """Return whether a render is there and was made after all that it shows: the capture's maps, its textures and head,
-    and the true maps."""
-    shown = [
-        path for folder in (capture.maps, capture.maps_4k, truth) if folder.is_dir() for path in folder.glob("*.png")
-    ]
+    """Return True if a render was made after the capture's maps, textures and head, and the true maps."""
+    shown = [path for folder in (capture.maps, capture.maps_4k, truth) for path in folder.glob("*.png")]
     shown += [path for path in (capture.head, capture.texture, capture.texture_filmed) if path.is_file()]
     return picture.is_file() and picture.stat().st_mtime >= max((path.stat().st_mtime for path in shown), default=0.0)
 
 
 def score(work: Path, lights: list[str], rows: list[str] = ROWS) -> dict[str, dict[str, dict]]:
-    """Light -> row -> PSNR, SSIM and FLIP over the face; and pictures of SHOWN side by side, work/LIGHT.png."""
+    """Return light -> row -> PSNR, SSIM and FLIP over the face, and write SHOWN side by side to work/LIGHT.png."""
     face = images.read_data(work / "renders" / "face.exr")[..., 0] > 0.5
-    box, seen, found = face_box(face), rendered(face), {}
+    box, window, found = face_box(face), rendered(face), {}
     for light in lights:
         linear = {
             row: images.read_linear(work / "renders" / f"{row}_{Path(light).stem}.exr") for row in ("truth", *rows)
@@ -224,21 +162,19 @@ def score(work: Path, lights: list[str], rows: list[str] = ROWS) -> dict[str, di
         gain = exposure(linear["truth"], face)
         shown = {row: images.linear_to_srgb(picture * gain) for row, picture in linear.items()}
         images.write_srgb(
-            work / f"{Path(light).stem}.png", np.hstack([shown[row][seen] for row in SHOWN if row in shown])
+            work / f"{Path(light).stem}.png", np.hstack([shown[row][window] for row in SHOWN if row in shown])
         )
         found[light] = {row: differences(shown[row][box], shown["truth"][box], face[box]) for row in rows}
     return found
 
 
 def exposure(truth: np.ndarray, face: np.ndarray) -> float:
-    """Return the gain that brings the mean luminance of a linear picture [H, W, 3] over the pixels `face` bool [H, W]
-    to MIDDLE."""
+    """Return the gain that brings the mean luminance of a linear picture [H, W, 3] over the face to MIDDLE."""
     return MIDDLE / float((truth[face] @ LUMINANCE).mean())
 
 
 def rendered(face: np.ndarray) -> tuple[slice, slice]:
-    """Rows and columns of the rectangle about the face, bool [H, W], that is rendered
-    (research/benchmarks/light/relit_renders.py)."""
+    """Return rows and columns of the rendered rectangle about the face, bool [H, W]."""
     margin = int(MARGIN * len(face)) - 1
     return tuple(
         slice(max(side[0] - margin, 0), side[-1] + margin)
@@ -247,36 +183,30 @@ def rendered(face: np.ndarray) -> tuple[slice, slice]:
 
 
 def side_by_side(pictures: list[np.ndarray]) -> np.ndarray:
-    """Pictures of one size in two columns, sRGB [H, W, 3]; an odd one out is followed by black."""
+    """Return pictures of one size in two columns, sRGB [H, W, 3]."""
     half = (len(pictures) + 1) // 2
     columns = pictures + [np.zeros_like(pictures[0])] * (2 * half - len(pictures))
     return np.hstack([np.vstack(columns[:half]), np.vstack(columns[half:])])
 
 
 def mean_over_lights(figures_by_light: dict[str, dict[str, dict]]) -> dict[str, dict[str, float]]:
-    """Row -> figures, each the mean over the lights."""
+    """Return row -> figures, each the mean over the lights."""
     rows = next(iter(figures_by_light.values()))
-    return {
-        row: {
-            figure: float(np.mean([figures_by_light[light][row][figure] for light in figures_by_light]))
-            for figure in rows[row]
-        }
-        for row in rows
-    }
+    return {row: mean_of([found[row] for found in figures_by_light.values()]) for row in rows}
 
 
 def shortfall(rows: dict[str, dict[str, float]]) -> str:
-    """Return what is missing to what is asked for, in words; empty where nothing is."""
+    """Return the gains that miss the goal, in words; '' if none does."""
     gains = {row: rows["solved"]["psnr"] - rows[row]["psnr"] for row in ("raw", "delit")}
     return ", ".join(
-        f"{gains[row]:+.2f} dB over {row} where {asked:.1f} is asked for"
-        for row, asked in (("raw", OVER_RAW), ("delit", OVER_DELIT))
-        if gains[row] < asked
+        f"{gains[row]:+.2f} dB over {row} where {goal:.1f} is asked for"
+        for row, goal in (("raw", OVER_RAW), ("delit", OVER_DELIT))
+        if gains[row] < goal
     )
 
 
 def with_mean(results: dict[str, dict[str, dict[str, float]]]) -> dict[str, dict[str, dict[str, float]]]:
-    """Return the same and, where there are several people of research/benchmarks/captures/people.py, their mean."""
+    """Return the results and, if there are several of PEOPLE, their mean."""
     people = [results[person.name] for person in PEOPLE if person.name in results]
     if len(people) < 2:
         return dict(results)
@@ -288,8 +218,7 @@ def with_mean(results: dict[str, dict[str, dict[str, float]]]) -> dict[str, dict
 
 
 def table(results: dict[str, dict[str, dict[str, float]]]) -> str:
-    """Markdown: a line per row, and for each subject PSNR, SSIM and FLIP; last the mean over the people of
-    research/benchmarks/captures/people.py."""
+    """Return Markdown: a line per row with PSNR, SSIM and FLIP of each subject, and the mean over PEOPLE."""
     columns, people = with_mean(results), sum(person.name in results for person in PEOPLE)
     return figures.markdown(
         ["row", *(f"mean of {people}" if name == "mean" else name.replace("_", " ") for name in columns)],
@@ -305,5 +234,4 @@ def table(results: dict[str, dict[str, dict[str, float]]]) -> str:
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     sys.exit(main())

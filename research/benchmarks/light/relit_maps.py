@@ -1,14 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What research/benchmarks/light/relit.py renders of a subject: one head, and per row the maps that it wears, as
-captures that the add-on opens.
+"""Heads that research/benchmarks/light/relit.py renders: captures of one head with the maps of each row.
 
 All rows share the registered head, so that pixels can be compared. It wears the true maps where its surface lies on the
 true head, not where their UVs agree: these are a millimetre apart, by which all fine detail would count as an error.
 All albedos have the same mean over confident facial skin, the truth's: what the rows differ in is not brightness.
 """
-
-from __future__ import annotations
 
 import shutil
 from dataclasses import dataclass, replace
@@ -38,8 +35,10 @@ FARTHEST_M = 0.01
 
 @dataclass(frozen=True)
 class Worn:
-    """float32 on S x S texels. albedo [S, S, 3]: linear; normal [S, S, 3]: unit, tangent space, OpenGL Y+; specular [S,
-    S]: Specular IOR Level."""
+    """Maps, float32 on S x S texels.
+
+    albedo [S, S, 3]: linear; normal [S, S, 3]: unit, tangent space, OpenGL Y+; specular [S, S]: Specular IOR Level.
+    """
 
     albedo: np.ndarray
     normal: np.ndarray
@@ -49,7 +48,7 @@ class Worn:
 def make_rows(raw: np.ndarray, delit: np.ndarray, solved: Worn, true: Worn, skin: np.ndarray) -> dict[str, Worn]:
     """Return the table's rows, whose albedos share one mean.
 
-    raw, delit: textures, linear [S, S, 3]; skin: [S, S], weight of the texels of that mean. Returns Name -> maps."""
+    raw, delit: textures, linear [S, S, 3]; skin: [S, S], weight of the texels of that mean. Returns name -> maps."""
     even = np.full_like(solved.specular, (solved.specular * skin).sum() / skin.sum())
     flat = np.broadcast_to(np.float32([0, 0, 1]), solved.normal.shape)
     tone = (true.albedo * skin[..., None]).sum((0, 1)) / skin.sum()
@@ -70,8 +69,7 @@ def make_rows(raw: np.ndarray, delit: np.ndarray, solved: Worn, true: Worn, skin
 
 
 def toned(texture: np.ndarray, tone: np.ndarray, skin: np.ndarray) -> np.ndarray:
-    """Return a texture [S, S, 3] times the gain per channel that gives it the linear mean `tone` [3] over the texels of
-    `skin` [S, S]."""
+    """Return a texture [S, S, 3] with the gain per channel that gives it the mean `tone` [3] over `skin` [S, S]."""
     return np.clip(texture * (tone * skin.sum() / (texture * skin[..., None]).sum((0, 1))), 0, 1).astype(np.float32)
 
 
@@ -86,8 +84,10 @@ def read_worn(folder: Path, size: int = SIZE) -> Worn:
 
 
 def worn_by(capture: Capture, true: Worn, subject: Mesh) -> Worn:
-    """Return the true maps on the capture's head: each texel shows what lies nearest on the subject [m, in the
-    capture's world], and its own where nothing does within FARTHEST_M."""
+    """Return the true maps on the capture's head: each texel takes the nearest on the subject within FARTHEST_M.
+
+    subject: in the capture's world, in metres.
+    """
     at = places(read_head(capture).mesh, (0, 0), Source(subject), len(true.specular), FARTHEST_M, lambda share: None)
 
     def carried(baked: np.ndarray, own: np.ndarray) -> np.ndarray:
@@ -99,8 +99,7 @@ def worn_by(capture: Capture, true: Worn, subject: Mesh) -> Worn:
 
 
 def read_rows(capture: Capture, true: Worn) -> dict[str, Worn]:
-    """`make_rows` of a solved capture and its subject's true maps; those at 4K where they were made of the solved
-    ones."""
+    """Return `make_rows` of a solved capture and its true maps, at 4K where the solved ones were enlarged."""
     newest = find_newest_maps(capture)[0].parent
     confidence = _sized(images.read_data(capture.texture_confidence)[..., 0], SIZE)
     raw, delit = (_sized(images.read_linear(path), SIZE) for path in (capture.texture_filmed, capture.texture))
@@ -108,12 +107,11 @@ def read_rows(capture: Capture, true: Worn) -> dict[str, Worn]:
 
 
 def write_row(folder: Path, capture: Capture, worn: Worn) -> None:
-    """A capture with the other one's head and record and these maps, which the add-on opens as solved; the record says
-    how glossy these maps are."""
+    """Write a capture with another one's head and record and these maps, for the add-on to open as solved."""
     row, record = Capture(folder), capture.read()
-    seen = _sized(images.read_data(capture.texture_confidence)[..., 0], len(worn.specular))
+    confidence = _sized(images.read_data(capture.texture_confidence)[..., 0], len(worn.specular))
     figures = record["stages"].get("upscale", {}).get("figures", {})
-    figures |= {"specular_mean": on_cheeks_and_forehead(worn.specular, seen)}
+    figures |= {"specular_mean": on_cheeks_and_forehead(worn.specular, confidence)}
     shutil.rmtree(folder, ignore_errors=True)
     row.maps.mkdir(parents=True)
     shutil.copyfile(capture.head, row.head)
@@ -125,7 +123,7 @@ def write_row(folder: Path, capture: Capture, worn: Worn) -> None:
 
 
 def face_mask(path: Path) -> None:
-    """The picture that tells face from head: red facial skin and lips, green everywhere."""
+    """Write the picture that tells face from head: red facial skin and lips, green everywhere."""
     face = template.mask("face", SIZE)
     images.write_data(path, np.stack([face, np.ones_like(face), np.zeros_like(face)], -1))
 

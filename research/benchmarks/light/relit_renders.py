@@ -1,15 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heads under the add-on's own lights, as linear EXR, in a process of its own (Blender's Python module):
+"""Render heads under the add-on's own lights to linear EXR, in a process of its own (Blender's Python module).
 
     python -m research.benchmarks.light.relit_renders JOB.json
 
 The job, written by research/benchmarks/light/relit.py, names captures (a head with maps each), lights, size, rays per
 pixel and the folder for CAPTURE_LIGHT.exr; pictures that exist stay. One more, face.exr, holds the first capture's
 masks: red where the face is, green where there is head. Only the rectangle about the face is rendered; the rest stays
-black."""
-
-from __future__ import annotations
+black.
+"""
 
 import json
 import os
@@ -65,7 +64,7 @@ def _render(scene, path: Path, seed: int) -> None:
 
 
 def _about_face(scene, mask: Path) -> None:
-    """Has the scene render the rectangle about the face and nothing else."""
+    """Set the scene to render the rectangle about the face alone."""
     import bpy
 
     image = bpy.data.images.load(str(mask), check_existing=True)
@@ -80,7 +79,7 @@ def _about_face(scene, mask: Path) -> None:
 
 
 def _render_mask(obj, scene, mask: str, path: Path) -> None:
-    """The head in a material that shines as a picture says, whatever the light; its own comes back."""
+    """Render the head in a material that shines as a picture says, then give its own back."""
     import bpy
 
     material = bpy.data.materials.new("mask")

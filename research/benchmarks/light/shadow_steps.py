@@ -1,21 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of a shadow a delighter leaves: the steps along M's border, as the solver sees them and as they are.
+"""Measure how much of a shadow a delighter leaves: steps along M's border, as seen by the solver and as they are.
 
     python -m research.benchmarks.light.shadow_steps FOLDER [--only PREFIX ...] [--truths FOLDER] [--json PATH]
 
-FOLDER holds captures with a texture, a proposed mask and a truth, as research/benchmarks/state.py reads them. In
-natural log, inside of M less outside, at the places of its border: what the delighter took out; what the solver sees,
-its texture over the mean face in its global light, in which skin's own steps are; and what is left of the light in
-truth, texture over true albedo. The last one's deviation is what core/solver/extensions/border.py calls LEFT: beside it
-stand that of all other people, the share of the steps that the solver takes for light by these, and the best share, the
-slope of the true steps on those that it sees."""
+FOLDER holds captures with a texture, a proposed mask and a truth, as research/benchmarks/delighting/state.py reads
+them. Steps are in natural log, inside of M less outside, at the places of its border: what the delighter took out; what
+the solver sees, its texture over the mean face in its global light, with skin's own steps; and what is left of the
+light in truth, texture over true albedo. The last one's deviation is LEFT in core/solver/extensions/border.py. Beside
+it stand that of all other people, the share of the steps that the solver takes for light by these, and the best share,
+the slope of the true steps on the seen ones.
+"""
 
-from __future__ import annotations
-
-import argparse
 import sys
-from pathlib import Path
 
 import numpy as np
 
@@ -41,12 +38,11 @@ HEAD = ["capture", "taken out", "seen", "left in truth", "LEFT of other people",
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "shadow_steps")
     add_captures(parser)
-    parser.add_argument("--json", type=Path, help="where the figures go")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     rows = {}
-    for filmed in captures_asked(parser, asked):
+    for filmed in captures_asked(parser, options):
         rows[filmed.name] = measure(filmed)
         print(f"{filmed.name}: measured", file=sys.stderr, flush=True)
     for row in rows.values():
@@ -54,19 +50,17 @@ def main() -> int:
         row["left_of_others"] = float(np.sqrt(np.mean(np.square(others)))) if others else None
         row["taken"] = min(1.0, (row["left_of_others"] / row["seen_spread"]) ** 2) if others else None
     print(table(rows))
-    if asked.json:
-        figures.write_record(asked.json, "shadow_steps", COMMAND, {"rows": rows})
+    figures.write_record(options.json, "shadow_steps", COMMAND, {"rows": rows})
     return 0
 
 
 def measure(filmed: Filmed) -> dict:
-    """Mean and deviation of each kind of step along M's border, and the slope of the true ones on those that are
-    seen."""
+    """Return mean and deviation of each kind of step along M's border, and the slope of true on seen ones."""
     capture = filmed.capture
     evidence = read_evidence(capture, read_filmed_head(capture), REFERENCE_TEXELS)
     tone = read_given_tone(people.skin_tone(filmed.truth))
     cell = evidence.cell_side(Settings().solve.grid_cells)
-    begun = start_solve(load(), evidence, tone.tensor, cell, OURS, make_head_cells)
+    start = start_solve(load(), evidence, tone.tensor, cell, OURS, make_head_cells)
     luminance = {
         name: np.log(
             np.maximum(
@@ -80,17 +74,17 @@ def measure(filmed: Filmed) -> dict:
             ("true", filmed.answer(TRUE)),
         )
     }
-    seen = np.log(find_remaining_light(evidence, begun).numpy().clip(0.05, 4)).mean(0)
+    remaining = np.log(find_remaining_light(evidence, start).numpy().clip(0.05, 4)).mean(0)
     weight = (evidence.weight * evidence.trust * evidence.skin).numpy()
     kinds = {
         "removed": luminance["filmed"] - luminance["delit"],
-        "seen": seen,
+        "seen": remaining,
         "left": luminance["delit"] - luminance["true"],
     }
     row, steps = {"person": filmed.person}, {}
     for kind, value in kinds.items():
         steps[kind], sure = border.measure_border_steps(
-            value.astype(np.float32), begun.alpha.numpy(), weight, evidence.texel
+            value.astype(np.float32), start.alpha.numpy(), weight, evidence.texel
         )
         row |= dict(zip((kind, f"{kind}_spread"), border.mean_and_deviation(steps[kind], sure), strict=True))
     about = {kind: steps[kind] - row[kind] for kind in ("seen", "left")}
@@ -100,14 +94,14 @@ def measure(filmed: Filmed) -> dict:
 
 
 def table(rows: dict[str, dict]) -> str:
-    """The rows in Markdown."""
+    """Return Markdown of the rows."""
     return figures.markdown(
         HEAD,
         [
             [
                 name,
                 *(f"{row[kind]:.2f} ± {row[f'{kind}_spread']:.2f}" for kind in ("removed", "seen", "left")),
-                *(None if row[key] is None else f"{row[key]:.2f}" for key in ("left_of_others", "taken", "best")),
+                *(figures.number(row[key], 2) for key in ("left_of_others", "taken", "best")),
             ]
             for name, row in rows.items()
         ],

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What environments are like, and how often a face's skin tells of them: the prior of core/light/sunlight.py.
+"""Measure the statistics of environments and facial skin behind the prior of core/light/sunlight.py.
 
     python -m research.benchmarks.light.skies FOLDER
 
@@ -8,9 +8,6 @@ FOLDER holds panoramas (.hdr, .exr), +Z up. Their sun or lamp is taken out as fo
 its own. Every panorama counts as if it were turned about the vertical by any angle.
 """
 
-from __future__ import annotations
-
-import argparse
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +20,7 @@ from core.solver.extensions.split import TRAIT_REACH_M
 from core.stages.delight.surface import skin_weights
 
 from ...people.environments import panorama_directions, read_panoramas, solid_angles, without_lamp
+from ..figures import command_line
 
 POINTS = 2500  # of the skin, drawn evenly
 PAIRS = ((1, 3), (4, 8), (5, 7))
@@ -30,7 +28,7 @@ PAIRS = ((1, 3), (4, 8), (5, 7))
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("folder", type=Path)
     panoramas = read_panoramas(parser.parse_args().folder)
     if not panoramas:
@@ -46,14 +44,14 @@ def main() -> int:
 
 
 def harmonic_shares(panorama: np.ndarray) -> np.ndarray:
-    """Orthonormal coefficients [9] of a panorama's luminance [H, W, 3], as shares of the first."""
+    """Return the coefficients [9] of a panorama's luminance [H, W, 3], as shares of the first."""
     size = panorama.shape[:2]
     coefficients = np.einsum("ijk,ij->k", sh_basis(panorama_directions(*size)), panorama.mean(-1) * solid_angles(*size))
     return coefficients / coefficients[0]
 
 
 def summarise_skies(shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and standard deviation [9] of environments [N, 9] that may be turned about the vertical by any angle."""
+    """Return mean and deviation [9] of environments [N, 9] that may be turned about the vertical."""
     mean, square = np.zeros(9), (shares**2).mean(0)
     for pair in PAIRS:
         square[list(pair)] = square[list(pair)].mean()
@@ -63,11 +61,13 @@ def summarise_skies(shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def count_independent(points: np.ndarray, weights: np.ndarray, reach: float) -> float:
-    """As how many independent samples points [V, 3] with weights [V] count whose values are correlated by
-    exp(-distance / reach)."""
-    known = np.flatnonzero(weights > 0)
-    known = known[:: max(1, len(known) // POINTS)]
-    points, weights = points[known], weights[known]
+    """Return the number of independent samples among points [V, 3] with weights [V].
+
+    Their values are correlated by exp(-distance / reach).
+    """
+    rows = np.flatnonzero(weights > 0)
+    rows = rows[:: max(1, len(rows) // POINTS)]
+    points, weights = points[rows], weights[rows]
     apart = np.linalg.norm(points[:, None] - points[None], axis=-1)
     return float(weights.sum() ** 2 / (weights @ np.exp(-apart / reach) @ weights))
 

@@ -1,11 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each part of the solver is worth, on UV-space problems with known truth
-(research/benchmarks/maps/uv_problems.py): subjects that no training saw.
+"""Measure what each part of the solver is worth, on UV-space problems with known truth that no training saw.
 
-    python -m research.benchmarks.maps.ablation OUT.json [--rows NAME ...] [--subjects NAME ...] [--skins FOLDER]
+    python -m research.benchmarks.maps.ablation OUT.json [--rows NAME ...] [--skins FOLDER]
         [--kind raw|delit]
-                                  [--size 256] [--steps 20] [--jobs 2]
     python -m research.benchmarks.maps.ablation OUT.json --table [--json research/records/ablation.json]
     python -m research.benchmarks.maps.ablation OUT.json --picture docs/pictures/ablation.jpg
 
@@ -14,20 +12,18 @@ what a tie is; the other rows run on one shadow per subject, the 600 steps of th
 problem each; every row is compared with the full method on its own problems only. OUT.json keeps every finished solve,
 so the command goes on where it was stopped. --skins names a folder of skins carried into our UVs (`python -m
 research.training carry`); those in the prior's card under held_out_skins are added to the subjects. The picture is of
-synthetic subjects only."""
-
-from __future__ import annotations
+synthetic subjects only.
+"""
 
 import argparse
 import json
 import math
-import os
 import tempfile
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -36,6 +32,7 @@ import torch
 from skimage.color import deltaE_ciede2000, rgb2lab
 
 from core.capture.capture import Capture
+from core.capture.files import replacing
 from core.face.head import read_head
 from core.imaging import images
 from core.solver.lights import total_variation, update_lights
@@ -55,6 +52,8 @@ from .uv_problems import LEE_PERRY_SMITH, SHADOWS, MaskedUvProblem, make_problem
 
 SUBJECTS = ("9000", "9002", "9004", "9007", "9008", LEE_PERRY_SMITH.name if LEE_PERRY_SMITH.is_dir() else "9001")
 FACE_CROP, CELLS = 768, 96
+SIZE, STEPS, JOBS = 256, 20, 2
+"""Texels along a side, steps of every row that does not say otherwise, and processes."""
 FULL = "full method"
 KEY = (FULL, "without texel grid", "without prior", "grid on the whole face", "the texture itself")
 PICTURED = "without texel grid", "without prior", FULL
@@ -94,71 +93,61 @@ TONES = (
     (0.47, 0.31, 0.23),
     (0.30, 0.20, 0.16),
 )
-"""sRGB, light to dark: asked for of one subject after the other, whatever its own is."""
+"""Tones that are requested, one of each subject, whatever its own is; sRGB, light to dark."""
+
+load_prior = cache(load)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "ablation")
     parser.add_argument("out", type=Path)
     parser.add_argument("--rows", nargs="+", choices=tuple(ROWS), default=list(ROWS))
-    parser.add_argument("--subjects", nargs="+", default=list(SUBJECTS))
     parser.add_argument("--skins", type=Path)
     parser.add_argument("--kind", choices=("raw", "delit"), default="raw")
-    parser.add_argument("--size", type=int, default=256)
-    parser.add_argument("--steps", type=int, default=20, help="of every row that does not say otherwise")
-    parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--table", action="store_true", help="solve nothing, print what is there")
-    parser.add_argument(
-        "--json", type=Path, help="where the table's figures go, such as research/records/ablation.json"
-    )
     parser.add_argument("--picture", type=Path, help="draw two subjects instead")
     options = parser.parse_args()
-    done = json.loads(options.out.read_text(encoding="utf-8")) if options.out.is_file() else {}
     if options.picture:
-        draw(options)
+        images.write_srgb(options.picture, draw(options.kind))
         return
+    done = json.loads(options.out.read_text(encoding="utf-8")) if options.out.is_file() else {}
     if not options.table:
         solve_all(options, done)
     found = summary({k: r for k, r in done.items() if "tone" not in r}, list(ROWS), FULL)
     print(table(found) + "\n\nSpread over the solver's seeds, dB:", found["spread"])
     differences = [r["tone"] for r in done.values() if "tone" in r]
     if differences:
-        found["tone"] = {"delivered": max(a for a, _ in differences), "sampled": max(b for _, b in differences)}
-        print(
-            "Skin tone, largest CIEDE2000 of the solved mean to the request over six tones, as delivered and by the "
-            "sampling alone:",
-            found["tone"],
-        )
-    if options.json:
-        figures.write_record(options.json, "ablation", "python -m research.benchmarks.maps.ablation OUT.json", found)
+        found["tone"] = dict(zip(("delivered", "sampled"), map(max, zip(*differences, strict=True)), strict=True))
+        print("Largest CIEDE2000 of the solved skin's mean to the requested tone:", found["tone"])
+    figures.write_record(options.json, "ablation", "python -m research.benchmarks.maps.ablation OUT.json", found)
 
 
 def solve_all(options: argparse.Namespace, done: dict) -> None:
-    """Fill `done` with the solves that are missing and stores it after each problem."""
-    subjects = [*options.subjects, *(_held_out(options.skins) if options.skins else [])]
+    """Solve what is missing in `done`, and store it after each problem."""
     tasks = []
-    for i, subject in enumerate(subjects):
+    for i, subject in enumerate([*SUBJECTS, *(_held_out(options.skins) if options.skins else [])]):
         for j, shadows in enumerate(SHADOWS):
-            wanted = [(row, seed) for row in options.rows for seed in (0, 1) if _belongs(row, i, j, seed)]
+            solves = [(row, seed) for row in options.rows for seed in (0, 1) if _belongs(row, i, j, seed)]
             if j == i % 3 and i < len(TONES) and options.kind == "raw":
-                wanted.append((f"tone {i}", 0))
-            wanted = [(row, seed) for row, seed in wanted if _key(row, subject, shadows, options, seed) not in done]
-            if wanted:
-                tasks.append((subject, shadows, wanted))
-    with ProcessPoolExecutor(options.jobs, get_context("spawn")) as pool:
-        for future in as_completed([pool.submit(_solve_problem, *task, options) for task in tasks]):
+                solves.append((f"tone {i}", 0))
+            missing = [solve for solve in solves if _key(*solve, subject, shadows, options.kind) not in done]
+            if missing:
+                tasks.append((subject, shadows, options.kind, missing))
+    with ProcessPoolExecutor(JOBS, get_context("spawn")) as pool:
+        for future in as_completed([pool.submit(_solve_problem, *task) for task in tasks]):
             if future.exception():
                 pool.shutdown(cancel_futures=True)
             done.update(future.result())
-            temporary = options.out.with_name(f".{options.out.name}")
-            temporary.write_text(json.dumps(done, indent=0), encoding="utf-8")
-            os.replace(temporary, options.out)
+            with replacing(options.out) as temporary:
+                temporary.write_text(json.dumps(done, indent=0), encoding="utf-8")
             print(f"{len(done)} solves", flush=True)
 
 
 def _belongs(row: str, subject: int, shadows: int, seed: int) -> bool:
-    """Return whether a row is solved on a problem: key rows on all, others on one shadow per subject, the 600 steps on
-    one problem each; two seeds of the first."""
+    """Return True if a row is solved on a problem.
+
+    Key rows run on all, others on one shadow per subject, the 600 steps on one problem each; the first has two seeds.
+    """
     if seed and row != FULL:
         return False
     if row in NAMED:
@@ -171,32 +160,28 @@ def _held_out(folder: Path) -> list[str]:
     return [str(folder / f"{name}.png") for name in names]
 
 
-def _solve_problem(subject: str, shadows: str, solves: list[tuple[str, int]], options: argparse.Namespace) -> dict:
+def _solve_problem(subject: str, shadows: str, kind: str, solves: list[tuple[str, int]]) -> dict:
     torch.set_num_threads(1)
-    given, found = make_problem(subject, shadows, options.size, options.kind), {}
+    given, found = make_problem(subject, shadows, SIZE, kind), {}
     for row, seed in solves:
         began = time.monotonic()
-        about = {"row": row, "seed": seed, "problem": [Path(subject).stem, shadows, options.size, options.kind]}
+        about = {"row": row, "seed": seed, "problem": [Path(subject).stem, shadows, SIZE, kind]}
         if row.startswith("tone "):
-            about["tone"] = tone_error(given, TONES[int(row[5:])], options.steps)
+            about["tone"] = tone_error(given, TONES[int(row[5:])])
         else:
-            albedo = solve_row(given, row, seed, options.steps)
-            about |= {
-                "seconds": round(time.monotonic() - began, 1),
-                **measure_regions(albedo, given.albedo, given.face, given.regions()),
-            }
-        found[_key(row, subject, shadows, options, seed)] = about
+            solved = solve_row(given, row, seed)
+            about["seconds"] = round(time.monotonic() - began, 1)
+            about |= measure_regions(solved, given.albedo, given.face, given.regions())
+        found[_key(row, seed, subject, shadows, kind)] = about
     return found
 
 
-def solve_row(uv_problem: MaskedUvProblem, row: str, seed: int, steps: int) -> np.ndarray:
-    """Solve a problem by one row's method, which is told the true skin tone.
-
-    steps: of every row that does not say otherwise. Returns the albedo, linear [S, S, 3]."""
+def solve_row(uv_problem: MaskedUvProblem, row: str, seed: int) -> np.ndarray:
+    """Solve a problem by one row's method with the true skin tone; linear albedo [S, S, 3]."""
     if row == "the texture itself":
         return uv_problem.texture
     changes, cells, mask, with_prior = ROWS[row]
-    recipe = RECIPES[NAMED[row]] if row in NAMED else replace(OURS, **{"steps": steps, **changes})
+    recipe = RECIPES[NAMED[row]] if row in NAMED else replace(OURS, **{"steps": STEPS, **changes})
     return solve_problem(uv_problem, recipe, uv_problem.tone, seed, cells, mask, with_prior)
 
 
@@ -213,7 +198,7 @@ def solve_problem(
 
     mask: what becomes of M: "painted", "empty" or "full"; with_prior: False: the texels follow the loss alone.
     Returns the albedo, linear [S, S, 3]."""
-    size, prior = len(uv_problem.albedo), _prior()
+    size, prior = len(uv_problem.albedo), load_prior()
     with tempfile.TemporaryDirectory() as folder:
         capture = Capture(folder)
         replace(
@@ -231,17 +216,13 @@ def solve_problem(
 
 
 def fit_texels(
-    start: Start,
-    recipe: Recipe,
-    updates: int = 600,
-    fit: Callable[..., None] = update_lights,
-    smooth: float = 0.0,
+    start: Start, recipe: Recipe, updates: int = 600, fit: Callable[..., None] = update_lights, smooth: float = 0.0
 ) -> State:
-    """No prior: the albedo's texels and the lights follow the photometric loss alone, under Adam (the paper's
-    ablation).
+    """Fit the albedo's texels and the lights to the photometric loss alone, under Adam (the paper's ablation).
 
-    start: begun from; its state changes, and is returned; recipe: of the lights; its phases last as long as the fit;
-    smooth: weight of the albedo's L1 variation."""
+    start: its state changes, and is returned; recipe: its phases last as long as the fit; smooth: weight of the
+    albedo's L1 variation.
+    """
     recipe = replace(
         recipe, phases=tuple((which, 0.0, 1.0) for which, _, _ in recipe.phases), refit=0.0, updates=updates
     )
@@ -262,35 +243,28 @@ def fit_texels(
     return state
 
 
-def tone_error(uv_problem: MaskedUvProblem, tone: tuple[float, float, float], steps: int) -> tuple[float, float]:
-    """CIEDE2000 between a requested skin tone (sRGB) and the mean of the solved facial skin: as it is delivered, and
-    before the mean is brought to the request."""
-    skin, found, asked = skin_weight(len(uv_problem.albedo)), [], SkinTone.from_srgb(tone, GIVEN)
+def tone_error(uv_problem: MaskedUvProblem, tone: tuple[float, float, float]) -> tuple[float, float]:
+    """Return CIEDE2000 between a requested tone (sRGB) and the solved skin's mean, as delivered and as sampled."""
+    skin, found, requested = skin_weight(len(uv_problem.albedo)), [], SkinTone.from_srgb(tone, GIVEN)
     for rescale in (OURS.rescale, "none"):
-        albedo = solve_problem(uv_problem, replace(OURS, steps=steps, rescale=rescale), asked)
-        mean = images.linear_to_srgb((albedo * skin[..., None]).sum((0, 1)) / skin.sum())
+        solved = solve_problem(uv_problem, replace(OURS, steps=STEPS, rescale=rescale), requested)
+        mean = images.linear_to_srgb((solved * skin[..., None]).sum((0, 1)) / skin.sum())
         found.append(round(float(deltaE_ciede2000(rgb2lab(mean), rgb2lab(np.array(tone)))), 3))
     return found[0], found[1]
 
 
-def draw(options: argparse.Namespace) -> None:
-    """Of two synthetic subjects the texture, the rows PICTURED and the truth."""
+def draw(kind: str) -> np.ndarray:
+    """Return the texture, the rows PICTURED and the truth of two synthetic subjects, sRGB."""
     lines = []
     for subject, shadows in (("9007", "leaves, hard"), ("9008", "edge, half soft")):
-        given = make_problem(subject, shadows, options.size, options.kind)
-        solves = [solve_row(given, row, 0, options.steps) for row in PICTURED]
-        pictures = [given.texture * (given.albedo.mean() / given.texture.mean()), *solves]
-        lines.append(np.hstack([*pictures, given.albedo]))
-    images.write_srgb(options.picture, images.linear_to_srgb(np.clip(np.vstack(lines), 0, 1)))
+        given = make_problem(subject, shadows, SIZE, kind)
+        texture = given.texture * (given.albedo.mean() / given.texture.mean())
+        lines.append(np.hstack([texture, *(solve_row(given, row, 0) for row in PICTURED), given.albedo]))
+    return images.linear_to_srgb(np.clip(np.vstack(lines), 0, 1))
 
 
-@lru_cache(maxsize=1)
-def _prior():
-    return load()
-
-
-def _key(row: str, subject: str, shadows: str, options: argparse.Namespace, seed: int) -> str:
-    return f"{row} | {Path(subject).stem} {shadows} {options.size} {options.kind} {options.steps} | seed {seed}"
+def _key(row: str, seed: int, subject: str, shadows: str, kind: str) -> str:
+    return f"{row} | {Path(subject).stem} {shadows} {SIZE} {kind} {STEPS} | seed {seed}"
 
 
 if __name__ == "__main__":

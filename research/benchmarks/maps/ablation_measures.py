@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the ablation measures of a solved albedo, region by region, and the table it makes of many
-(research/benchmarks/maps/ablation.py)."""
-
-from __future__ import annotations
+"""Ablation's figures of a solved albedo, region by region, and their table."""
 
 from functools import cache
 
@@ -17,7 +14,7 @@ from core.capture.messages import Problem
 from core.imaging import images
 from core.stages.texture.features import load_features
 
-from ..figures import markdown
+from ..figures import markdown, number
 
 REGIONS = ("shadow", "band", "outside")
 FIGURES = ("psnr", "ssim", "flip", "features")
@@ -29,7 +26,7 @@ def measure_regions(
 ) -> dict[str, dict[str, float]]:
     """Compare an albedo with the truth in sRGB, after the gain per channel (linear) that is best for the whole face.
 
-    albedo, truth: linear [S, S, 3]; face: bool [S, S]; regions: name -> bool [S, S]. Returns Region -> figures: PSNR
+    albedo, truth: linear [S, S, 3]; face: bool [S, S]; regions: name -> bool [S, S]. Returns region -> figures: PSNR
     in dB, SSIM, FLIP and the feature distance (where its network is installed)."""
     gain = (albedo[face] * truth[face]).sum(0) / (albedo[face] ** 2).sum(0)
     ours = images.linear_to_srgb(albedo * gain).astype(np.float32)
@@ -56,9 +53,11 @@ def measure_regions(
 
 
 def feature_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray | None:
-    """[S, S]: squared difference of a network's unit features, summed over its layers (Zhang et al. 2018); None where
-    requirements/perceptual.txt is not installed. Not LPIPS: the network is EfficientNet-Lite0 without learned weights
-    per channel. sRGB [S, S, 3]."""
+    """Return the squared difference of a network's unit features, summed over layers, [S, S], sRGB inputs.
+
+    Zhang et al. 2018, but not LPIPS: EfficientNet-Lite0 without learned weights per channel. None if
+    requirements/perceptual.txt is not installed.
+    """
     if (network := _network()) is None:
         return None
     with torch.no_grad():
@@ -82,9 +81,10 @@ def _network():
 
 
 def summary(done: dict[str, dict], rows: list[str], first: str) -> dict[str, dict]:
-    """Region -> row -> the means of FIGURES and seconds over the problems that the row was solved on, problems, seeds,
-    and `to_first`: its PSNR's distance to row `first` on just these problems and seeds, in dB (None for itself); and
-    under "spread" half the difference between two seeds of that row, in dB."""
+    """Return region -> row -> means over its problems, and "spread", half the difference between two seeds.
+
+    `to_first`: the distance of its PSNR to row `first` on the same problems and seeds, in dB.
+    """
     by_row = {row: {_problem(r): r for r in done.values() if r["row"] == row} for row in rows}
     full = by_row.get(first, {})
     found: dict[str, dict] = {region: {} for region in REGIONS}
@@ -108,24 +108,23 @@ def summary(done: dict[str, dict], rows: list[str], first: str) -> dict[str, dic
 
 
 def table(figures: dict[str, dict]) -> str:
-    """Markdown of `summary`: per region a line per row. A distance to the first row that is smaller than the spread
-    over its seeds is a tie; a figure that no row has is left out."""
+    """Return Markdown of `summary`: a line per region and row; a distance within the spread over seeds is a tie."""
     if not figures[REGIONS[0]]:
         return "The first row was not solved yet."
     tables = []
-    known = [figure for figure in FIGURES[1:] if any(row[figure] is not None for row in figures[REGIONS[0]].values())]
+    columns = [figure for figure in FIGURES[1:] if any(row[figure] is not None for row in figures[REGIONS[0]].values())]
     for region in REGIONS:
         spread, first = figures["spread"][region], next(iter(figures[region]))
         tables.append(
             markdown(
-                [region, "problems x seeds", "PSNR", f"to {first}", *(TITLES[k] for k in known), "seconds"],
+                [region, "problems x seeds", "PSNR", f"to {first}", *(TITLES[k] for k in columns), "seconds"],
                 [
                     [
                         row,
                         f"{r['problems']} x {r['seeds']}",
                         f"{r['psnr']:.2f}",
                         "" if row == first else _compared(r["to_first"], spread),
-                        *(None if r[figure] is None else f"{r[figure]:.3f}" for figure in known),
+                        *(number(r[figure], 3) for figure in columns),
                         f"{r['seconds']:.0f}",
                     ]
                     for row, r in figures[region].items()
@@ -136,12 +135,12 @@ def table(figures: dict[str, dict]) -> str:
 
 
 def _compared(distance: float, spread: float | None) -> str:
-    """Return how far a row is from the first, in dB, and whether that is within the spread."""
+    """Return the distance of a row to the first, in dB, marked if it is within the spread."""
     return f"{distance:+.2f}" + (" (tie)" if spread is not None and abs(distance) < spread else "")
 
 
 def seed_spread(results: list[dict], region: str) -> float | None:
-    """Half the difference between the best and the worst seed, as a mean over problems; None for one seed."""
+    """Return half the difference between the best and the worst seed, a mean over problems; None for one seed."""
     by_problem: dict = {}
     for r in results:
         by_problem.setdefault(_problem(r)[:-1], []).append(r[region]["psnr"])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Solved albedo against true albedo, in image space, on facial skin (the paper's protocol for Digital Emily).
+"""Score the solved albedo against the true one in the picture, on facial skin (the paper's protocol).
 
     python -m research.benchmarks.maps.albedo_score CAPTURE TRUTH [--json OUT.json]
 
@@ -12,9 +12,6 @@ numbered by video frame. Figures per capture, each the mean over the frames with
   face_coverage      share of the face masks that the solved head covers
 """
 
-from __future__ import annotations
-
-import argparse
 import json
 import math
 from dataclasses import dataclass
@@ -31,8 +28,9 @@ from core.geometry.views import read_views
 from core.imaging import images
 
 from ..captures.films import read_film
-from ..figures import markdown, write_record
+from ..figures import command_line, markdown, number, write_record
 from ..measures.pictures import detail, differences, face_box, log_green, shadow_step, with_gain
+from ..measures.table import mean_of
 
 FINEST = 1024
 """Texels of a map's side that are looked up one by one: a texel is then a quarter of a millimetre, and no larger than a
@@ -43,8 +41,7 @@ LABELS = {"WildCap": "**WildCap**", "raw video": "the raw video", "flat true ton
 
 @dataclass(frozen=True)
 class AlbedoTruth:
-    """One frame's truth: albedo sRGB [H, W, 3], facial skin bool [H, W], and where the sun does not reach, bool [H, W]
-    or None."""
+    """One frame's truth: sRGB albedo [H, W, 3], facial skin and, if known, shadow, bool [H, W]."""
 
     frame: int
     albedo: np.ndarray
@@ -53,7 +50,7 @@ class AlbedoTruth:
 
 
 def read_truth(folder: Path) -> list[AlbedoTruth]:
-    """Return the frames of a truth folder. Raises Problem when there are none."""
+    """Return the frames of a truth folder. Raises Problem if there are none."""
     frames = []
     for path in sorted((folder / "albedo").glob("*.png")):
         shadow = folder / "shadow" / path.name
@@ -72,8 +69,7 @@ def read_truth(folder: Path) -> list[AlbedoTruth]:
 
 @dataclass(frozen=True)
 class HeadInView:
-    """What a view with truth sees of a head: hit bool [H, W], and for each pixel that hits where on the map it lies,
-    [N, 2], u and v."""
+    """A view with truth: hit, bool [H, W], where it shows the head, and uv [N, 2] of these pixels."""
 
     true: AlbedoTruth
     hit: np.ndarray
@@ -91,8 +87,8 @@ def score_capture(capture: Capture, truth: Path) -> dict:
     albedo = averaged(
         images.read_srgb(next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists()))
     )
-    seen, missing = looks(capture, truth)
-    return {"frames_not_registered": missing, **score_map(albedo, seen)}
+    views, missing = looks(capture, truth)
+    return {"frames_not_registered": missing, **score_map(albedo, views)}
 
 
 def averaged(albedo: np.ndarray) -> np.ndarray:
@@ -103,25 +99,27 @@ def averaged(albedo: np.ndarray) -> np.ndarray:
 
 
 def looks(capture: Capture, truth: Path) -> tuple[list[HeadInView], list[int]]:
-    """Return the registered frames with truth as they see the capture's head, and the numbers of those that were not
-    registered. Raises Problem where none was."""
+    """Return the registered frames with truth as they see the head, and the numbers of the others.
+
+    Raises Problem if none was registered.
+    """
     whole = read_head(capture)
     head, caster = whole.mesh, whole.caster
     frames = read_frames(capture).by_name
     views = {frames[view.name].video_frame: view for view in read_views(capture)}
-    seen, missing = [], []
+    found, missing = [], []
     for true in read_truth(truth):
         if true.frame not in views:
             missing.append(true.frame)
             continue
         face, bary, _ = raster.render_view(caster, views[true.frame], true.face.shape[1] / views[true.frame].width)
         hit = face >= 0
-        seen.append(HeadInView(true, hit, raster.interpolate(head.uvs, head.face_uvs, face[hit], bary[hit])))
-    if not seen:
+        found.append(HeadInView(true, hit, raster.interpolate(head.uvs, head.face_uvs, face[hit], bary[hit])))
+    if not found:
         raise Problem(
             "None of the frames with a known albedo was registered.", "Look at the cameras stage in the report."
         )
-    return seen, missing
+    return found, missing
 
 
 def score_map(albedo: np.ndarray, looks: list[HeadInView]) -> dict:
@@ -135,8 +133,8 @@ def score_floors(truth: Path) -> dict:
     """Return what has to be beaten: the raw video taken for albedo, and the true mean skin colour everywhere."""
     frames = {true.frame: true for true in read_truth(truth)}
     raw, flat = [], []
-    for number, image in enumerate(read_film(truth / "capture.mp4")):
-        if (true := frames.get(number)) is not None:
+    for frame, image in enumerate(read_film(truth / "capture.mp4")):
+        if (true := frames.get(frame)) is not None:
             raw.append(compare(image.astype(np.float32) / 255, true, true.face))
             tone = images.linear_to_srgb(images.srgb_to_linear(true.albedo[true.face]).mean(0))
             flat.append(compare(np.broadcast_to(tone, true.albedo.shape), true, true.face))
@@ -144,7 +142,7 @@ def score_floors(truth: Path) -> dict:
 
 
 def compare(predicted: np.ndarray, true: AlbedoTruth, mask: np.ndarray) -> dict:
-    """One frame's figures: predicted albedo sRGB [H, W, 3] against the truth over the pixels of `mask`."""
+    """Return one frame's figures of a predicted albedo, sRGB [H, W, 3], over the pixels of `mask`."""
     box = face_box(mask)
     predicted, mask = predicted[box], mask[box]
     true = AlbedoTruth(true.frame, true.albedo[box], true.face[box], None if true.shadow is None else true.shadow[box])
@@ -159,20 +157,13 @@ def compare(predicted: np.ndarray, true: AlbedoTruth, mask: np.ndarray) -> dict:
 
 
 def mean_scores(results: list[dict]) -> dict:
-    """Return the mean over frames of what `compare` gives."""
-    figures = {
-        kind: {name: float(np.mean([r[kind][name] for r in results])) for name in results[0][kind]}
-        for kind in ("raw", "gain")
-    }
-    for name in ("detail", "shadow_step"):
-        values = [r[name] for r in results if not math.isnan(r[name])]
-        figures[name] = float(np.mean(values)) if values else None
-    return figures
+    """Return the mean over frames of the figures of `compare`."""
+    pictured = {kind: mean_of([result[kind] for result in results]) for kind in ("raw", "gain")}
+    return {**pictured, **mean_of([{key: result[key] for key in ("detail", "shadow_step")} for result in results])}
 
 
 def rows(scores: dict[str, dict]) -> dict[str, dict]:
-    """Row -> PSNR in dB as it is and after the gain, SSIM, FLIP, detail and shadow step, of what `score_capture` and
-    `score_floors` give."""
+    """Return row -> figures of a table, from `score_capture` and `score_floors`."""
     return {
         name: {
             "psnr": score["raw"]["psnr"],
@@ -187,7 +178,7 @@ def rows(scores: dict[str, dict]) -> dict[str, dict]:
 
 
 def table(figures: dict) -> str:
-    """Markdown of figures["rows"], as `rows` gives them."""
+    """Return Markdown of figures["rows"], as `rows` gives them."""
     return markdown(
         ["taken for albedo", "PSNR", "after one gain", "SSIM", "FLIP", "detail", "shadow step"],
         [
@@ -198,7 +189,7 @@ def table(figures: dict) -> str:
                 f"{r['ssim']:.3f}",
                 f"{r['flip']:.3f}",
                 f"{r['detail']:.2f}",
-                None if r["shadow_step"] is None else f"{r['shadow_step']:.2f}",
+                number(r["shadow_step"], 2),
             ]
             for name, r in figures["rows"].items()
         ],
@@ -206,22 +197,16 @@ def table(figures: dict) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__, "scan_albedo")
     parser.add_argument("capture", type=Path)
     parser.add_argument("truth", type=Path)
-    parser.add_argument("--json", type=Path, help="where the figures go, such as research/records/scan_albedo.json")
-    arguments = parser.parse_args()
-    ours = score_capture(Capture(arguments.capture), arguments.truth)
-    scores = {"WildCap": ours, **score_floors(arguments.truth)}
+    options = parser.parse_args()
+    ours = score_capture(Capture(options.capture), options.truth)
+    scores = {"WildCap": ours, **score_floors(options.truth)}
     print(json.dumps(scores, indent=1))
-    if arguments.json:
-        ours = scores["WildCap"]
-        write_record(
-            arguments.json,
-            "albedo_score",
-            "python -m research.benchmarks.maps.albedo_score CAPTURE TRUTH",
-            {"views": ours["views"], "face_coverage": ours["face_coverage"], "rows": rows(scores)},
-        )
+    found = {"views": ours["views"], "face_coverage": ours["face_coverage"], "rows": rows(scores)}
+    command = "python -m research.benchmarks.maps.albedo_score CAPTURE TRUTH"
+    write_record(options.json, "albedo_score", command, found)
 
 
 if __name__ == "__main__":

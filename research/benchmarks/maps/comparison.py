@@ -1,32 +1,22 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Albedo against truth, the paper's protocol for Digital Emily: our light beside other methods' light models, on delit
-and on raw frames.
+"""Compare our light with other methods' light models, on delit and raw frames (the paper's protocol).
 
-    python -m research.benchmarks.maps.comparison FOLDER [--only NAME ...] [--scan CAPTURE TRUTH] [--size 512] [--jobs
-        2] [--json OUT.json]
+    python -m research.benchmarks.maps.comparison FOLDER [--only NAME ...] [--scan CAPTURE TRUTH] [--json OUT.json]
 
 FOLDER was made and solved by research/benchmarks/captures/people.py; CAPTURE is a solved one of another subject, TRUTH
-its folder. Rows of INPUT: METHOD over one texture:
-  wildcap                  the texel grid of local light in the shadow mask, by two seeds, whose spread is a tie
-  regions 5, regions 10    soft regions with a light each (light_models.py)
-  environment              one environment cubemap
-  environment, no prior    the same, and texels that follow the frames alone, smoothly
-  over its blur            the texture divided by its own blur, what one does by hand in Blender
-  texture                  taken for albedo as it is
-All but the last three sample the same prior with the same guidance; all are told the true skin tone. Raw rows get the
-mask that the chain proposes for raw frames. Maps are kept in FOLDER/comparison (research/benchmarks/maps/rerender.py
-reads them), so that a second run goes on where the first stopped."""
+its folder. Rows of INPUT: METHOD over one texture: ours, by two seeds, whose spread is a tie; soft regions with a light
+each, and one environment cubemap, with the prior or with texels that follow the frames alone (light_models.py); the
+texture over its own blur; and the texture as it is. All are given the true skin tone. Raw rows get the mask that the
+chain proposes for raw frames. FOLDER/comparison keeps the maps (research/benchmarks/maps/rerender.py reads them), so a
+second run goes on where the first stopped.
+"""
 
-from __future__ import annotations
-
-import argparse
 import json
-import os
 import shutil
 import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
 from multiprocessing import get_context
@@ -66,82 +56,67 @@ LIGHTS: dict[str, Callable] = {
     "environment": light_models.light_by_environment,
     "environment, no prior": light_models.light_by_environment,
 }
+load_prior = cache(load)
 METHODS = (OURS, *LIGHTS, "over its blur", "texture")
 FREE = "environment, no prior"
 FREE_UPDATES, FREE_SMOOTH = 200, 0.01
+SIZE, JOBS = 512, 2  # texels along a side, processes
 BLUR = 0.03  # deviation as a share of the map's side: keeps moles, takes a cheek's shading
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "comparison")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="*", default=[p.name for p in PEOPLE])
     parser.add_argument("--scan", nargs=2, type=Path, metavar=("CAPTURE", "TRUTH"))
-    parser.add_argument("--size", type=int, default=512)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     folder = options.folder.resolve()
     subjects = {name: (folder / f"{name}.wildcap", folder / name) for name in options.only}
     if options.scan:
         subjects["scan"] = tuple(path.resolve() for path in options.scan)
-    found = {}
-    with ProcessPoolExecutor(options.jobs, get_context("spawn")) as pool:
+    with ProcessPoolExecutor(JOBS, get_context("spawn")) as pool:
         running = {
-            pool.submit(compare_methods, *paths, folder / "comparison" / name, options.size): name
-            for name, paths in subjects.items()
+            name: pool.submit(compare_methods, *paths, folder / "comparison" / name) for name, paths in subjects.items()
         }
-        for future in as_completed(running):
-            found[running[future]] = future.result()
-            print(f"{running[future]} compared", flush=True)
-    found = {"size": options.size, "subjects": {name: found[name] for name in subjects}}
-    found |= (
-        {"people": means([rows for name, rows in found["subjects"].items() if name != "scan"])}
-        if set(found["subjects"]) - {"scan"}
-        else {}
-    )
-    found |= {"scan": means([found["subjects"]["scan"]])} if "scan" in subjects else {}
-    if options.json:
-        figures.write_record(
-            options.json,
-            "comparison",
-            "python -m research.benchmarks.maps.comparison FOLDER --scan CAPTURE TRUTH",
-            found,
-        )
-    print(f"{table(found)}\n\n{paired_table(found['subjects'])}")
+        compared = {name: future.result() for name, future in running.items()}
+    found = {"size": SIZE, "subjects": compared}
+    if people := [rows for name, rows in compared.items() if name != "scan"]:
+        found["people"] = means(people)
+    if "scan" in compared:
+        found["scan"] = means([compared["scan"]])
+    command = "python -m research.benchmarks.maps.comparison FOLDER --scan CAPTURE TRUTH"
+    figures.write_record(options.json, "comparison", command, found)
+    print(f"{table(found)}\n\n{paired_table(compared)}")
 
 
-def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[str, dict]:
+def compare_methods(source: Path, truth: Path, work: Path) -> dict[str, dict]:
     """Score all methods on one subject.
 
-    source: a capture with texture and mask; truth: folder of the true albedo, and of the tone that all are given;
-    work: takes each row's maps and scores; what is there is not solved again; size: of the maps, texels along a
-    side. Returns Input -> method -> seed -> figures."""
+    source: a capture with texture and mask; truth: folder of the true albedo, and of the tone that all are given; work:
+    takes each row's maps and scores, which are not made twice. Returns input -> method -> seed -> figures.
+    """
     torch.set_num_threads(1)
     found: dict[str, dict] = {given: {} for given in INPUTS}
     for given in INPUTS:
+        values = {"solve": {"skin_tone": skin_tone(truth), "size": SIZE}}
         settings = from_json(
-            {
-                "solve": {"skin_tone": skin_tone(truth), "size": size},
-                "delight": {"delighter": "none"} if given == "raw" else {},
-            },
-            preset("standard"),
+            values | ({"delight": {"delighter": "none"}} if given == "raw" else {}), preset("standard")
         )
         capture = Capture(source) if given == "delit" else _raw(Capture(source), work / "raw.wildcap", settings)
-        seen = None
+        views = None
         for method in METHODS:
             for seed in SEEDS.get(method, (0,)) if given == "delit" else (0,):
                 row = find_row_folder(work, given, method, seed)
                 if not (row / "score.json").is_file():
-                    seen = seen or looks(capture, truth)[0]
-                    _keep(row, *solve_by_method(capture, settings, method, seed), seen)
+                    views = views or looks(capture, truth)[0]
+                    _keep(row, *solve_by_method(capture, settings, method, seed), views)
                 score = json.loads((row / "score.json").read_text(encoding="utf-8"))
                 found[given].setdefault(method, {})[str(seed)] = score
     return found
 
 
 def find_row_folder(work: Path, input_name: str, method: str, seed: int = 0) -> Path:
-    """Return where a row's diffuse_albedo.exr, shading.exr and score.json lie."""
+    """Return the folder of a row's diffuse_albedo.exr, shading.exr and score.json."""
     return work / f"{input_name}_{method.replace(', ', '_').replace(' ', '_')}_{seed}"
 
 
@@ -150,13 +125,13 @@ def solve_by_method(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Solve a capture by one method.
 
-    Returns Diffuse albedo and shading, linear [S, S, 3], and the seconds that it took."""
+    Returns diffuse albedo and shading, linear [S, S, 3], and the seconds that it took."""
     began = time.monotonic()
     head = read_head(capture)
     evidence = read_evidence(capture, head, settings.solve.size)
     if method in ("texture", "over its blur"):
         return *_by_hand(capture, evidence, settings, method), time.monotonic() - began
-    prior = _prior()
+    prior = load_prior()
     cell = evidence.cell_side(settings.solve.grid_cells)
     tone = read_given_tone(settings.solve.skin_tone)
     start = start_solve(
@@ -206,8 +181,7 @@ def _keep(row: Path, diffuse: np.ndarray, shading: np.ndarray, seconds: float, l
 
 
 def _raw(source: Capture, folder: Path, settings: Settings) -> Capture:
-    """Return a copy of a capture whose texture is the frames' as filmed, with the mask that the chain proposes for it;
-    made once."""
+    """Return a copy of a capture with the texture as filmed and the mask proposed for it; made once."""
     copy = Capture(folder)
     if not copy.shadow_mask_auto.is_file():
         shutil.rmtree(folder, ignore_errors=True)
@@ -228,11 +202,5 @@ def _raw(source: Capture, folder: Path, settings: Settings) -> Capture:
     return copy
 
 
-@cache
-def _prior():
-    return load()
-
-
 if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     main()

@@ -1,13 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tables of research/benchmarks/maps/comparison.py: means over the subjects, and ours less each other method,
-person by person."""
-
-from __future__ import annotations
+"""Tables of research/benchmarks/maps/comparison.py."""
 
 import numpy as np
 
 from .. import figures
+from ..measures.table import mean
 
 INPUTS = ("delit", "raw")
 OURS = "wildcap"
@@ -19,23 +17,14 @@ COLUMNS = {
     "detail": lambda s: s["detail"],
     "shadow step": lambda s: s["shadow_step"],
 }
-FORMATS = {
-    "PSNR": "{:.2f}",
-    "after one gain": "{:.2f}",
-    "SSIM": "{:.3f}",
-    "FLIP": "{:.3f}",
-    "detail": "{:.2f}",
-    "shadow step": "{:.2f}",
-}
 
 
 def means(subjects: list[dict]) -> dict:
-    """Of several subjects' figures: input -> method -> column -> mean of the first seed; and 'spread': half of what two
-    seeds of ours differ by."""
+    """Return input -> method -> column -> mean over subjects, and "spread", half the difference of two seeds."""
     out: dict = {
         given: {
             method: {
-                column: _mean([value(one[given][method]["0"]) for one in subjects]) for column, value in COLUMNS.items()
+                column: mean([value(one[given][method]["0"]) for one in subjects]) for column, value in COLUMNS.items()
             }
             for method in subjects[0][given]
         }
@@ -44,15 +33,14 @@ def means(subjects: list[dict]) -> dict:
     two = [one["delit"][OURS] for one in subjects]
     return out | {
         "spread": {
-            column: _mean([abs(value(s["0"]) - value(s["1"])) / 2 for s in two if value(s["0"]) is not None])
+            column: mean([abs(value(s["0"]) - value(s["1"])) / 2 for s in two if value(s["0"]) is not None])
             for column, value in COLUMNS.items()
         }
     }
 
 
 def table(record: dict) -> str:
-    """Markdown: a line per row with the means over the people, of each input's rows the best of each column and what
-    ties with it in bold; then the scan's."""
+    """Return Markdown: a line per row with means over people, best and ties in bold for each input; then the scan's."""
     parts = []
     for key, title in (("people", "mean of the people"), ("scan", "head scan")):
         if key not in record:
@@ -79,8 +67,10 @@ DIFFERENCES = {
 
 
 def paired(subjects: dict[str, dict]) -> dict:
-    """Ours less each other method, person by person: input -> method -> column of DIFFERENCES -> mean and the standard
-    error of the mean. subjects: name -> what comparison.compare_methods found."""
+    """Return ours less each other method: input -> method -> column -> mean and its standard error.
+
+    subjects: name -> figures of comparison.compare_methods.
+    """
 
     def differences(given: str, method: str, about: str, figure: str) -> tuple[float, float]:
         gains = [
@@ -101,23 +91,22 @@ def paired(subjects: dict[str, dict]) -> dict:
 
 
 def paired_table(subjects: dict[str, dict]) -> str:
-    """Markdown of `paired`: bold where ours is better by more than two standard errors, italic where worse by more
-    than one."""
+    """Return Markdown of `paired`: bold if better by two standard errors, italic if worse by one."""
     lines = []
     for given, methods in paired(subjects).items():
         for method, found in methods.items():
             line = [f"{given}: less {method}"]
-            for column, (mean, error) in found.items():
-                text, better = DIFFERENCES[column][2].format(mean, error), -mean if column == "FLIP" else mean
+            for column, (gain, error) in found.items():
+                text, better = DIFFERENCES[column][2].format(gain, error), -gain if column == "FLIP" else gain
                 line.append(f"**{text}**" if better > 2 * error else f"*{text}*" if better < -error else text)
             lines.append(line)
     return figures.markdown(["ours, person by person", *DIFFERENCES], lines)
 
 
 def _cell(column: str, figure: float | None, column_values: list[float | None], spread: float | None) -> str:
-    known = [_badness(column, v) for v in column_values if v is not None]
+    others = [_badness(column, v) for v in column_values if v is not None]
     text = _text(column, figure)
-    return f"**{text}**" if figure is not None and _badness(column, figure) <= min(known) + (spread or 0) else text
+    return f"**{text}**" if figure is not None and _badness(column, figure) <= min(others) + (spread or 0) else text
 
 
 def _badness(column: str, figure: float) -> float:
@@ -125,9 +114,4 @@ def _badness(column: str, figure: float) -> float:
 
 
 def _text(column: str, figure: float | None) -> str:
-    return "-" if figure is None else FORMATS[column].format(figure)
-
-
-def _mean(scores: list[float | None]) -> float | None:
-    known = [v for v in scores if v is not None]
-    return float(np.mean(known)) if known else None
+    return figures.number(figure, 3 if column in ("SSIM", "FLIP") else 2) or "-"

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the confidence of the solved albedo is an uncertainty, on people with a known albedo, and what the four
-deviations of core/stages/solve/confidence.py are.
+"""Judge the confidence of the solved albedo as an uncertainty, and fit the deviations of stages/solve/confidence.py.
 
     python -m research.benchmarks.maps.confidence FOLDER [--truths FOLDER] [--only PREFIX ...] [--json
     research/records/confidence.json]
@@ -10,15 +9,12 @@ FOLDER holds captures as research/benchmarks/delighting/state.py measures them, 
 of the solved map to the true one at one tone, over the texels of the face that were seen well. The deviations are the
 most likely ones for normal errors, each capture's own size of error left free; the row *left out* takes for each person
 those of all others. The size itself, which no row of the likelihood needs, is the median over captures. Only figures
-are written."""
+are written.
+"""
 
-from __future__ import annotations
-
-import argparse
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -35,7 +31,7 @@ from ..captures.state_captures import SIZE, SOLVED, Filmed, add_captures, captur
 from ..measures.calibration import calibrate
 from ..measures.references import TRUE
 from ..measures.shared_light import log_ratio
-from ..measures.table import Column, Scores, format_table, summarise, to_record
+from ..measures.table import Column, format_table, mean_of, summarise, to_record
 from ..measures.tone import to_tone
 from ..pages import Sections, prose
 
@@ -56,8 +52,7 @@ FEW = 4000
 
 @dataclass(frozen=True)
 class Errors:
-    """Of one capture: error [N], variances [N, 4] of `confidence.variances`, blurred [N]: the deviation of the error
-    about a texel, which nobody could know."""
+    """One capture's errors [N], their `confidence.variances` [N, 4], and the deviation of the error nearby [N]."""
 
     person: str
     error: np.ndarray
@@ -66,19 +61,17 @@ class Errors:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "confidence")
     add_captures(parser)
-    parser.add_argument("--json", type=Path)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     captures = {
         filmed.name: read_errors(filmed)
-        for filmed in captures_asked(parser, asked)
+        for filmed in captures_asked(parser, options)
         if filmed.answer(SOLVED) is not None
     }
     record = measure(captures)
     print("\n\n".join(body for _, body in sections(record)))
-    if asked.json:
-        figures.write_record(asked.json, "confidence", COMMAND, record)
+    figures.write_record(options.json, "confidence", COMMAND, record)
     return 0
 
 
@@ -97,7 +90,7 @@ def read_errors(filmed: Filmed) -> Errors:
 
 
 def measure(captures: dict[str, Errors]) -> dict:
-    """Return the table's scores, the captures' rows, and the deviations that all of them make most likely."""
+    """Return the table's scores, the captures' rows, and the most likely deviations."""
     shipped = np.array([getattr(confidence, name) for name in DEVIATIONS])
     people = sorted({each.person for each in captures.values()})
     others = (
@@ -105,7 +98,6 @@ def measure(captures: dict[str, Errors]) -> dict:
         if len(people) > 1
         else {}
     )
-    scores: Scores = {}
     rows: dict[str, dict[str, list[dict]]] = {}
     by_capture = {}
     for name, each in captures.items():
@@ -117,11 +109,9 @@ def measure(captures: dict[str, Errors]) -> dict:
             rows.setdefault(method, {}).setdefault(each.person, []).append(judged)
             if method == SHIPPED:
                 by_capture[name] = judged
-    for method, of_people in rows.items():
-        scores[method] = {
-            person: {measure: float(np.mean([row[measure] for row in found])) for measure in COLUMNS}
-            for person, found in of_people.items()
-        }
+    scores = {
+        method: {person: mean_of(found) for person, found in of_people.items()} for method, of_people in rows.items()
+    }
     fitted = fit_deviations(captures.values())
     return {
         **to_record(summarise(scores, COLUMNS), scores),
@@ -134,7 +124,7 @@ def measure(captures: dict[str, Errors]) -> dict:
 
 
 def fit_deviations(captures: Iterable[Errors]) -> np.ndarray:
-    """[4]: the most likely deviations, in natural log."""
+    """Return the most likely deviations [4], in natural log."""
     rng, chosen = np.random.default_rng(0), []
     for each in captures:
         some = rng.choice(len(each.error), min(FEW, len(each.error)), replace=False)
@@ -157,9 +147,11 @@ def fit_deviations(captures: Iterable[Errors]) -> np.ndarray:
 
 
 def judge(error: np.ndarray, sigma: np.ndarray) -> dict[str, float]:
-    """Likelihood gained over the best constant and coverage, both by the factor of sigma that is best for the capture;
-    coverage without it; Spearman's correlation with the size of the error; the mean error of the half with the smaller
-    sigma over that of the other."""
+    """Return the figures of COLUMNS for errors and their sigmas.
+
+    Gain and coverage use the best factor of sigma for the capture, coverage_absolute none; half: mean error of the half
+    with the smaller sigma over that of the other.
+    """
     found = calibrate(error, sigma * np.sqrt(np.mean((error / sigma) ** 2)))
     size, order = np.abs(error), np.argsort(sigma, kind="stable")
     sure, rest = order[: len(order) // 2], order[len(order) // 2 :]
@@ -173,18 +165,17 @@ def judge(error: np.ndarray, sigma: np.ndarray) -> dict[str, float]:
 
 
 def sections(record: dict) -> Sections:
-    """Heading and Markdown of each part of the page."""
+    """Return heading and Markdown of each part of the page."""
     found, people = summarise(record["people"], COLUMNS), len(record["people"][SHIPPED])
     plain = confidence.PLAIN_DEVIATION
     words = prose(f"""
-        A confidence of *c* says that the grey logarithm of the albedo is right within {plain:.2f} / *c* in two texels
-        of three: {100 * plain:.0f} % where it is 1, twice as much where it is a half. Means over people ± their spread,
-        {len(record["captures"])} captures of {people} people, over the texels of the face that were seen well. *Nats
-        gained*: mean log-likelihood over that of the best constant of the capture (aim: 0.1), and *within one sigma*
-        (aim: 0.60 to 0.76, 0.683 for normal errors), both by the factor that is best for the capture; *as it is*,
-        without. *Error of the surer half* is over that of the other. *{LEFT_OUT.capitalize()}*: the deviations of all
-        other people, for each. *{BLURRED.capitalize()}* over {BLUR_TEXELS:.0f} texels of {SIZE}: what one would have
-        to know for more.
+        A confidence of *c* means that the grey logarithm of the albedo is right within {plain:.2f} / *c* in two texels
+        of three: {100 * plain:.0f} % for 1, twice as much for a half. Means over people ± their spread,
+        {len(record["captures"])} captures of {people} people, over well-seen texels of the face. *Nats gained*: mean
+        log-likelihood over that of the capture's best constant (goal: 0.1); *within one sigma* (goal: 0.60 to 0.76,
+        0.683 for normal errors); both with the best factor for the capture; *as it is*: without it. *Error of the surer
+        half*: over that of the other half. *{LEFT_OUT.capitalize()}*: the deviations of all other people, for each.
+        *{BLURRED.capitalize()}* over {BLUR_TEXELS:.0f} texels of {SIZE}: the knowledge that a higher gain would need.
         """)
     names = ["", *(f"`{name}`" for name in record["deviations"])]
     rows = [
@@ -206,8 +197,8 @@ def sections(record: dict) -> Sections:
         ),
         (
             "The deviations",
-            "In natural log (`core/stages/solve/confidence.py`), and what all these captures make most "
-            "likely.\n\n" + figures.markdown(names, rows),
+            "In natural log (`core/stages/solve/confidence.py`), and the most likely values for these captures.\n\n"
+            + figures.markdown(names, rows),
         ),
     ]
 

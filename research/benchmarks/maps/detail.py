@@ -1,14 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of a person's own marks a texture keeps: moles one by one (freckles and dots of stubble among them), pores
-by their band.
+"""Measure how much of a person's marks a texture keeps: moles, freckles and stubble one by one, pores by their band.
 
 Both are measured against true albedo frames, in the picture, on the logarithm of linear green, so no tone or gain
 counts. The texture is rendered with several rays per pixel, as the truth was: one ray would count aliasing for or
 against it.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -29,7 +26,7 @@ MOLE_PX = (1.2, 5.0)
 MOLE_DEPTH = 0.05
 """Least depth of a mole in that band, as a difference of logarithms (5 %)."""
 MOLES = 60
-"""The deepest of a frame's moles are used, this many at most."""
+"""Deepest of a frame's moles are used, this many at most."""
 PORE_PX = (0.7, 2.0)
 
 
@@ -74,29 +71,27 @@ def cast_face_rays(caster: raster.RayCaster, view: View, true: AlbedoTruth, marg
 
 
 def centre_rays(rays: FaceRays, texture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the map sRGB [S, S, 3] by one ray per pixel, as albedo_score renders it: sRGB [h, w, 3] and the pixels
-    that hit."""
+    """Return a map sRGB [S, S, 3] seen by one ray per pixel: sRGB [h, w, 3], and the pixels that hit."""
     at, hit = (x[RAYS // 2 :: RAYS, RAYS // 2 :: RAYS] for x in (rays.at, rays.hit))
     return raster.sample(texture, at.reshape(-1, 2) * len(texture)).reshape(*hit.shape, 3) * hit[..., None], hit
 
 
 def marks(rays: FaceRays, texture: np.ndarray) -> dict | None:
-    """Figures of one frame for a texture sRGB [S, S, 3] in the head's UVs.
+    """Return the figures of one frame for a texture, sRGB [S, S, 3] in the head's UVs; None without skin to judge.
 
-    mole_contrast: regression of the rendered moles on the true ones, 1 keeps their depth and place, 0 lost them all;
-    moles: how many; pore_contrast: ratio of deviations in the band; pore_correlation. None where nothing is left to
-    judge.
+    mole_contrast: regression of the rendered moles on the true ones, 1 keeps their depth and place; moles: their
+    number; pore_contrast: ratio of deviations in the band; pore_correlation.
     """
     colours = raster.sample(images.srgb_to_linear(texture), rays.at.reshape(-1, 2) * len(texture))
     linear = colours.reshape(*rays.hit.shape, 3) * rays.hit[..., None]
     whole = _shrunk(rays.hit.astype(np.float32))
-    known = rays.true.face & (whole > 0.99)
-    inner = cv2.erode((known & rays.bare).astype(np.uint8), np.ones((17, 17))) > 0
+    skin = rays.true.face & (whole > 0.99)
+    inner = cv2.erode((skin & rays.bare).astype(np.uint8), np.ones((17, 17))) > 0
     if inner.sum() < 500:
         return None
     greens = _shrunk(linear[..., 1]) / np.maximum(whole, 1e-6), images.srgb_to_linear(rays.true.albedo)[..., 1]
     logs = [np.log(np.maximum(green, 2e-3)) for green in greens]
-    logs = [np.where(known, log, log[known].mean()).astype(np.float32) for log in logs]
+    logs = [np.where(skin, log, log[skin].mean()).astype(np.float32) for log in logs]
     (pores, true_pores), (spots, true_spots) = ([_band(log, *sigmas) for log in logs] for sigmas in (PORE_PX, MOLE_PX))
     slopes = [_slope(spots, true_spots, y, x) for y, x in moles(true_spots, inner)]
     return {
@@ -108,7 +103,7 @@ def marks(rays: FaceRays, texture: np.ndarray) -> dict | None:
 
 
 def moles(band: np.ndarray, inner: np.ndarray) -> list[tuple[int, int]]:
-    """Rows and columns of dark, roundish minima of a band-passed picture [h, w] inside a mask, deepest first."""
+    """Return rows and columns of dark, roundish minima of a band-passed picture [h, w] in a mask, deepest first."""
     lowest = (band <= cv2.erode(band, np.ones((7, 7)))) & inner & (band < -MOLE_DEPTH)
     smooth = cv2.GaussianBlur(band, (0, 0), 1)
     xx, yy, xy = (cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((2, 0), (0, 2), (1, 1)))
@@ -121,7 +116,7 @@ def moles(band: np.ndarray, inner: np.ndarray) -> list[tuple[int, int]]:
 
 
 def mean_of(frames: list[dict | None]) -> dict:
-    """Means over frames; frames without moles say nothing about them."""
+    """Return means over frames; frames without moles do not count for them."""
     found = [f for f in frames if f]
     if not found:
         return {}

@@ -1,15 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light models of other methods behind the solver's own contract, so that a comparison changes the light and nothing
-else: our own writing, not their code.
+"""Light models of other methods, of our own writing, behind the solver's contract: only the light differs.
 
 A light model is a shader with `main` and `total` (shading [3, H, W] of its lights), the lights' parameters, and their
 loss. Regions (DeFace, Huang et al.): the face is divided softly into K regions, learned with one SH light each.
 Environment (FLARE, Bharadwaj et al. 2023; split sum after Munkberg et al. 2022): one diffuse cubemap of free texels for
 the whole face. Both know the shadow mask no more than those methods do.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -35,8 +32,7 @@ ROUGH = 0.02  # weight of its squared differences, per seen texel, pair and mean
 
 @dataclass
 class RegionLights(Lights):
-    """glob [3, 9]: what all regions share; grid [K, 3, 9]: each one's own light beyond that; chroma [K, CELLS, CELLS]:
-    logits of who lights a texel."""
+    """Lights: glob [3, 9] of all regions; grid [K, 3, 9] of each; chroma [K, CELLS, CELLS], logits of regions."""
 
 
 class RegionShader:
@@ -64,10 +60,10 @@ class RegionShader:
 
 
 def light_by_regions(start: Start, recipe: Recipe, count: int, seed: int = 0):
-    """Put soft regions with a light each in place of the grid; they begin as clusters of place and lightness on the
-    face.
+    """Replace the grid by soft regions with a light each, which begin as clusters of place and lightness.
 
-    Returns the start, the recipe, and what moves the lights."""
+    Returns the start, the recipe, and the function that moves the lights.
+    """
     observations = {
         factor: replace(o, shader=RegionShader(o.shader.normal)) for factor, o in start.observations.items()
     }
@@ -76,7 +72,7 @@ def light_by_regions(start: Start, recipe: Recipe, count: int, seed: int = 0):
 
 
 def _region_loss(lights: RegionLights, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> torch.Tensor:
-    """L_pho with the pull of our own recipe: the regions' own light towards none, as no mask has a border to ask."""
+    """Return L_pho with the recipe's pull of the regions' own light towards none."""
     own = o.shader.own(lights)
     loss = photometric_loss(denoised, o.shader.main(lights) + own, o, o.weight * o.trust)
     brightness = (o.weight * albedo(denoised) ** 2).mean()
@@ -84,8 +80,7 @@ def _region_loss(lights: RegionLights, denoised: torch.Tensor, o: Observation, r
 
 
 def _clusters(start: Start, count: int, seed: int) -> torch.Tensor:
-    """Logits [count, CELLS, CELLS] of k-means over the map's cells by place and by the logarithm of texture over first
-    rendering."""
+    """Return logits [count, CELLS, CELLS] of k-means over cells by place and log(texture / first rendering)."""
     o = start.observations[1]
     rendered = albedo(start.reference) * o.shader.main(start.state.lights)
     ratio = (o.texture.clamp_min(1e-3) / rendered.clamp_min(1e-3)).log().mean(0).clamp(-2, 2)
@@ -103,12 +98,11 @@ def _clusters(start: Start, count: int, seed: int) -> torch.Tensor:
 
 @dataclass
 class EnvironmentLights(Lights):
-    """glob [6 FACE^2, 3]: the logarithm of the cubemap's radiance; grid and chroma are not used."""
+    """Lights: glob [6 FACE^2, 3], the logarithm of the cubemap's radiance; grid and chroma are not used."""
 
 
 class EnvironmentShader:
-    """Shading by a cubemap: radiance folded with the cosine lobe into an irradiance cubemap, which the normals read
-    linearly."""
+    """Shading by a cubemap of irradiance, which the normals read linearly."""
 
     def __init__(self, normal: torch.Tensor):
         directions, self.lobe, self.neighbours = cubemap()
@@ -128,7 +122,7 @@ class EnvironmentShader:
 
 
 def light_by_environment(start: Start, recipe: Recipe):
-    """`start` under one environment cubemap, even at first, the recipe, and what moves it."""
+    """Return `start` under one even environment cubemap, the recipe, and the function that moves it."""
     observations = {
         factor: replace(o, shader=EnvironmentShader(o.shader.normal)) for factor, o in start.observations.items()
     }
@@ -146,7 +140,7 @@ def light_by_environment(start: Start, recipe: Recipe):
 def _environment_loss(
     lights: EnvironmentLights, denoised: torch.Tensor, o: Observation, recipe: Recipe
 ) -> torch.Tensor:
-    """L_pho, and smoothness of the cubemap's logarithm."""
+    """Return L_pho plus the roughness of the cubemap's logarithm."""
     one, other = o.shader.neighbours.T
     rough = ((lights.glob[one] - lights.glob[other]) ** 2).mean()
     brightness = (o.weight * albedo(denoised) ** 2).mean()
@@ -156,8 +150,10 @@ def _environment_loss(
 
 @cache
 def cubemap() -> tuple[np.ndarray, torch.Tensor, torch.Tensor]:
-    """Unit directions [N, 3] of a cubemap's N = 6 FACE^2 texels; the matrix [N, N] from radiance to irradiance over pi
-    in those directions (rows sum to one); pairs [P, 2] of neighbours, across edges too."""
+    """Return a cubemap's unit directions [N, 3], the matrix [N, N] to irradiance over pi, and neighbours [P, 2].
+
+    N = 6 FACE^2; the matrix' rows sum to one; neighbours are also those across edges.
+    """
     across = (np.arange(FACE) + 0.5) / FACE * 2 - 1
     u, v = (a.ravel() for a in np.meshgrid(across, across))
     one = np.ones_like(u)

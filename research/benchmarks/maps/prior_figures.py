@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a trained prior knows: samples beside what it was trained on, and how well normals and specular follow from the
-diffuse.
+"""Measure a trained prior: samples beside the training skins, and normals and specular given the diffuse.
 
     python -m research.benchmarks.maps.prior_figures samples OUT.png --work DIR [--skins FOLDER] [--weights FILE]
     python -m research.benchmarks.maps.prior_figures response [--subjects 9000 9001 ...] [--size 512] [--weights FILE]
@@ -12,8 +11,6 @@ prior that copies gives 0. DIR is the training's work folder. `response` gives h
 prior, which tells the rest: the angle of the normals to the true ones and the RMSE of specular, sampled, as the mean of
 what is possible, and as a draft solves and restores them, against the mean face's maps and another subject's.
 """
-
-from __future__ import annotations
 
 import argparse
 import json
@@ -39,91 +36,68 @@ from core.stages.solve.skin_tone import GIVEN, SkinTone
 from ...people.skin import make_skin
 from ...training.patches import mean_map
 from ...training.skins import SCALES, carried_names, carried_skins, synthetic_skins
-from ..figures import write_record
+from ..figures import command_line, write_record
+from ..pictures.sheet import in_rows
 
 COMMAND = (
     "python -m research.benchmarks.maps.prior_figures samples OUT.png --work DIR --skins FOLDER; "
     "python -m research.benchmarks.maps.prior_figures response"
 )
 PATCH = 64
+SAMPLES, STEPS = 32, 60
 COARSE = SCALES[-1]
 NAMES = "sampled", "expected", "draft", "draft, not restored", "mean face", "another subject"
 FIRST_SIGMA = 7.3  # where the solver's walk begins
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     commands = parser.add_subparsers(required=True)
-    samples = commands.add_parser("samples")
+    samples, response = commands.add_parser("samples"), commands.add_parser("response")
+    for command, function in ((samples, show_samples), (response, measure_response)):
+        command.set_defaults(command=function)
+        command.add_argument("--weights", type=Path, default=WEIGHTS)
+        command.add_argument("--json", type=Path, help="write the figures, as to research/records/prior.json")
     samples.add_argument("out", type=Path)
     samples.add_argument("--work", type=Path, required=True)
     samples.add_argument("--skins", type=Path)
-    samples.add_argument("--count", type=int, default=32)
-    samples.add_argument("--steps", type=int, default=60)
-    samples.set_defaults(command=show_samples)
-    response = commands.add_parser("response")
-    response.add_argument("--subjects", type=int, nargs="+", default=[9000, 9001, 9002, 9003, 9004, 9005])
+    response.add_argument("--subjects", type=int, nargs="+", default=range(9000, 9006))
     response.add_argument("--size", type=int, default=512)
     response.add_argument("--steps", type=int, default=OURS.steps)
-    response.set_defaults(command=measure_response)
-    for command in (samples, response):
-        command.add_argument("--weights", type=Path, default=WEIGHTS)
-        command.add_argument(
-            "--json",
-            type=Path,
-            help="where the figures go, such as research/records/prior.json; those of the other command stay",
-        )
     options = parser.parse_args()
     options.command(options)
 
 
 def show_samples(options: argparse.Namespace) -> None:
-    prior, report = load(options.weights), Reporter("prior")
-    card = card_of(options.weights)
+    prior, report, card = load(options.weights), Reporter("prior"), card_of(options.weights)
     skins = synthetic_skins(card["seeds"], options.work, report)
     if options.skins:
         names = [name for name in carried_names(options.skins) if name in card["skins"]]
         skins = skins + carried_skins(options.skins, names, mean_map(skins), options.work, report)
     rng, side = np.random.default_rng(0), 1024 // COARSE
     face = np.argwhere(template.mask("face", side) > 0.5)
-    corner = np.clip(face[rng.integers(len(face), size=options.count)] - PATCH // 2, 0, side - PATCH)
+    corner = np.clip(face[rng.integers(len(face), size=SAMPLES)] - PATCH // 2, 0, side - PATCH)
     coords = torch.cat([make_coordinates(side, slice(r, r + PATCH), slice(c, c + PATCH)) for r, c in corner])
-    tone = skins.tones[torch.from_numpy(rng.integers(len(skins.tones), size=options.count))]
-    drawn = draw_from_prior(prior, coords, tone, options.steps)
-    albedo = (drawn[:, :3] + 1) / 2
+    tone = skins.tones[torch.from_numpy(rng.integers(len(skins.tones), size=SAMPLES))]
+    albedo = (draw_from_prior(prior, coords, tone)[:, :3] + 1) / 2
     pairs, ratios = [], []
     for (row, column), sampled, skin_tone in zip(corner, albedo, tone, strict=True):
-        window = slice(row, row + PATCH), slice(column, column + PATCH)
-        mirrored = slice(row, row + PATCH), slice(side - column - PATCH, side - column)
-        known = [
-            ((m[(slice(3), *w)].float() + 1) / 2 / t[:, None, None]).flip([2] if w is mirrored else [])
-            for m, t in zip(skins.maps[COARSE], skins.tones, strict=True)
-            for w in (window, mirrored)
-        ]
-        known = torch.stack(known)
-        distance = (known - sampled / skin_tone[:, None, None]).pow(2).mean((1, 2, 3)).sqrt()
-        nearest = int(distance.argmin())
-        apart = (known - known[nearest]).pow(2).mean((1, 2, 3)).sqrt()
-        ratios.append(float(distance[nearest] / apart[apart > 1e-4].min()))
-        pairs.append(torch.cat([sampled, known[nearest] * skin_tone[:, None, None]], 2))
-    sheet = torch.stack(pairs).clamp(0, 1).permute(0, 2, 3, 1).numpy()
-    columns = 4
-    sheet = np.vstack([np.hstack(sheet[i : i + columns]) for i in range(0, len(sheet) - columns + 1, columns)])
+        patches = []
+        for maps, own in zip(skins.maps[COARSE], skins.tones, strict=True):
+            for left, mirrored in ((column, False), (side - column - PATCH, True)):
+                patch = (maps[:3, row : row + PATCH, left : left + PATCH].float() + 1) / 2 / own[:, None, None]
+                patches.append(patch.flip(2) if mirrored else patch)
+        patches = torch.stack(patches)
+        distance = (patches - sampled / skin_tone[:, None, None]).pow(2).mean((1, 2, 3)).sqrt()
+        nearest = patches[int(distance.argmin())]
+        apart = (patches - nearest).pow(2).mean((1, 2, 3)).sqrt()
+        ratios.append(float(distance.min() / apart[apart > 1e-4].min()))
+        pairs.append(torch.cat([sampled, nearest * skin_tone[:, None, None]], 2).clamp(0, 1).permute(1, 2, 0).numpy())
+    sheet = in_rows(pairs, 4)
     images.write_srgb(options.out, images.linear_to_srgb(images.resize(sheet, 2 * sheet.shape[1], 2 * sheet.shape[0])))
-    print(
-        f"{options.count} samples; distance to the nearest training patch over that patch's own distance to its "
-        "nearest: "
-        f"median {np.median(ratios):.2f}, least {min(ratios):.2f}. Left of each pair the sample, right the training "
-        "patch."
-    )
-    if options.json:
-        write_record(
-            options.json,
-            "prior_figures",
-            COMMAND,
-            {"samples": {"count": options.count, "median": np.median(ratios), "least": min(ratios)}},
-            keep=True,
-        )
+    found = {"count": SAMPLES, "median": np.median(ratios), "least": min(ratios)}
+    print("Distance to the nearest training patch over that patch's own distance to its nearest:", found)
+    write_record(options.json, "prior_figures", COMMAND, {"samples": found}, keep=True)
 
 
 def card_of(weights: Path) -> dict:
@@ -132,17 +106,17 @@ def card_of(weights: Path) -> dict:
 
 
 @torch.no_grad()
-def draw_from_prior(prior: Prior, coords: torch.Tensor, tone: torch.Tensor, steps: int) -> torch.Tensor:
+def draw_from_prior(prior: Prior, coords: torch.Tensor, tone: torch.Tensor) -> torch.Tensor:
     """Draw maps from the prior alone.
 
     coords: [N, 2, P, P], where the windows lie; tone: [N, 3], linear, of the skins. Returns [N, 7, P, P] in the
     network's range."""
-    told = make_condition(coords, prior.octaves, prior.mean_face, prior.spread, tone, torch.zeros(len(tone)))
-    sigmas = [s for s in karras_sigmas(steps, 0.01, 80.0) if s <= FIRST_SIGMA]
+    condition = make_condition(coords, prior.octaves, prior.mean_face, prior.spread, tone, torch.zeros(len(tone)))
+    sigmas = [s for s in karras_sigmas(STEPS, 0.01, 80.0) if s <= FIRST_SIGMA]
     generator = torch.Generator().manual_seed(0)
-    x = told.mean + sigmas[0] * torch.randn(told.mean.shape, generator=generator)
+    x = condition.mean + sigmas[0] * torch.randn(condition.mean.shape, generator=generator)
     for s, s_next in zip(sigmas[:-1], sigmas[1:], strict=True):
-        clean = denoise(prior.network, x, torch.full((len(x),), s), told)
+        clean = denoise(prior.network, x, torch.full((len(x),), s), condition)
         s_down, s_up = ancestral_sigmas(s, s_next)
         x = x + (x - clean) / s * (s_down - s) + s_up * torch.randn(x.shape, generator=generator)
     return clean
@@ -151,11 +125,9 @@ def draw_from_prior(prior: Prior, coords: torch.Tensor, tone: torch.Tensor, step
 def measure_response(options: argparse.Namespace) -> None:
     prior = load(options.weights)
     face = torch.from_numpy(template.mask("face", options.size) > 0.5)
-    skins = {seed: reflectance(seed, options.size) for seed in options.subjects}
+    skins = [reflectance(seed, options.size) for seed in options.subjects]
     rows = []
-    for i, seed in enumerate(options.subjects):
-        truth = skins[seed]
-        other = skins[options.subjects[(i + 1) % len(options.subjects)]]
+    for seed, truth, other in zip(options.subjects, skins, skins[1:] + skins[:1], strict=True):
         conditioned = of_subject(prior, truth)
         solved = sample_given_diffuse(conditioned, truth, options.steps)
         coords = make_coordinates(options.size, slice(0, options.size), slice(0, options.size))
@@ -165,40 +137,20 @@ def measure_response(options: argparse.Namespace) -> None:
         draft = sample_given_diffuse(conditioned, truth, options.steps, "proximal")
         again = restore_maps(conditioned, draft[None], coords, 0)[0]
         rows.append([errors(maps, truth, face) for maps in (solved, expected, again, draft, mean, other)])
+        found = zip(NAMES, rows[-1], strict=True)
         print(
-            f"{seed}: "
-            + "; ".join(
-                f"{name} {angle:.2f} deg, {gloss:.4f}" for name, (angle, gloss) in zip(NAMES, rows[-1], strict=True)
-            ),
-            flush=True,
+            f"{seed}:", "; ".join(f"{name} {angle:.2f} deg, {gloss:.4f}" for name, (angle, gloss) in found), flush=True
         )
-    means = np.mean(rows, 0)
-    if options.json:
-        write_record(
-            options.json,
-            "prior_figures",
-            COMMAND,
-            keep=True,
-            figures={
-                "response": {
-                    name: {
-                        f"{what}_of_{whose}": means[k][part] / means[of][part]
-                        for of, whose in ((-2, "mean_face"), (-1, "another"))
-                        for part, what in enumerate(("normals", "specular"))
-                    }
-                    for k, name in enumerate(NAMES[:-2])
-                }
-            },
-        )
-    for k, name in enumerate(NAMES[:-2]):
-        print(
-            f"{name}: "
-            + ", ".join(
-                f"normals {means[k][0] / means[j][0]:.2f} and specular {means[k][1] / means[j][1]:.2f} of "
-                f"{NAMES[j]}'s error"
-                for j in (-2, -1)
-            )
-        )
+    *means, mean, other = np.mean(rows, 0)
+    response = {}
+    for name, (normals, specular) in zip(NAMES[:-2], means, strict=True):
+        response[name] = {
+            f"{figure}_of_{whose}": own / of[part]
+            for whose, of in (("mean_face", mean), ("another", other))
+            for part, (figure, own) in enumerate((("normals", normals), ("specular", specular)))
+        }
+        print(f"{name}:", ", ".join(f"{key} {value:.2f}" for key, value in response[name].items()))
+    write_record(options.json, "prior_figures", COMMAND, {"response": response}, keep=True)
 
 
 def reflectance(seed: int, size: int) -> torch.Tensor:
@@ -241,7 +193,7 @@ def sample_given_diffuse(
 
 
 def errors(maps: torch.Tensor, truth: torch.Tensor, face: torch.Tensor) -> tuple[float, float]:
-    """RMS angle of normals in degrees, and RMSE of specular, over the face."""
+    """Return the RMS angle of normals in degrees, and the RMSE of specular, over the face."""
     unit = torch.nn.functional.normalize(maps[3:6], dim=0)
     cosine = (unit * torch.nn.functional.normalize(truth[3:6], dim=0)).sum(0)[face].clamp(-1, 1)
     degrees = torch.rad2deg(torch.arccos(cosine))

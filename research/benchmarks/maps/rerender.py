@@ -1,18 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Face reconstruction, the paper's table 1: albedo times shading in the views that were solved from, against the delit
-frames, on facial skin.
+"""Compare albedo times shading with the delit frames on facial skin (the paper's table 1).
 
     python -m research.benchmarks.maps.rerender FOLDER [--only NAME ...] [--json OUT.json]
 
 FOLDER was made by research/benchmarks/captures/people.py and compared by research/benchmarks/maps/comparison.py, whose
 delit rows are taken. Each view has a gain per channel of its own (delighters and cameras expose each frame anew), the
 same way for every row. The ceiling is the texture itself in the same views: where they disagree with each other no
-albedo and no shading can explain them all."""
+albedo and no shading can explain them all.
+"""
 
-from __future__ import annotations
-
-import argparse
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +25,7 @@ from core.imaging import images
 from .. import figures
 from ..captures.people import PEOPLE
 from ..measures.pictures import differences, face_box, with_gain
+from ..measures.table import mean_of
 from .ablation_measures import feature_distance
 from .albedo_score import AlbedoTruth, HeadInView
 from .comparison import LIGHTS, OURS, find_row_folder
@@ -44,35 +42,27 @@ FORMATS = {"psnr": "{:.2f} dB", "ssim": "{:.4f}", "flip": "{:.4f}", "features": 
 
 @dataclass(frozen=True)
 class DelitFrame:
-    """A delit frame, sRGB [H, W, 3], and how the head looks from there; `look.true.face` is the facial skin that is
-    judged."""
+    """A delit frame, sRGB [H, W, 3], and the head seen from there; `look.true.face` is the judged facial skin."""
 
     picture: np.ndarray
     look: HeadInView
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "rerender")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     people = {}
     for name in options.only:
-        views = delit_views(Capture(options.folder / f"{name}.wildcap"))
-        people[name] = {
-            row: score(rendering(options.folder / "comparison" / name, row), views) for row in (*ROWS, CEILING)
-        }
+        views, work = delit_views(Capture(options.folder / f"{name}.wildcap")), options.folder / "comparison" / name
+        people[name] = {row: score(rendering(work, row), views) for row in (*ROWS, CEILING)}
         print(name, json.dumps(people[name]), flush=True)
     found = {
         "people": people,
-        "mean": {
-            row: {figure: float(np.mean([rows[row][figure] for rows in people.values()])) for figure in cells}
-            for row, cells in next(iter(people.values())).items()
-        },
+        "mean": {row: mean_of([rows[row] for rows in people.values()]) for row in (*ROWS, CEILING)},
     }
-    if options.json:
-        figures.write_record(options.json, "rerender", "python -m research.benchmarks.maps.rerender FOLDER", found)
+    figures.write_record(options.json, "rerender", "python -m research.benchmarks.maps.rerender FOLDER", found)
     print(table(found))
 
 
@@ -101,47 +91,42 @@ def delit_views(capture: Capture) -> list[DelitFrame]:
 
 
 def rendering(work: Path, row: str) -> np.ndarray:
-    """Albedo times shading of a delit row, linear [S, S, 3]; the ceiling's is the texture that all rows were solved
-    from."""
+    """Return albedo times shading of a delit row, linear [S, S, 3]; the ceiling's is the texture itself."""
     folder = find_row_folder(work, "delit", "texture" if row == CEILING else row)
     return images.read_linear(folder / "diffuse_albedo.exr") * images.read_linear(folder / "shading.exr")
 
 
 def score(rendered: np.ndarray, views: list[DelitFrame]) -> dict[str, float]:
-    """PSNR, SSIM, FLIP and, where its network is installed, the feature distance of a map [S, S, 3] (linear) to the
-    delit frames, each the mean over views."""
+    """Return the figures of a linear map [S, S, 3] against the delit frames, means over views."""
     found = []
     for view in views:
         mask = view.look.true.face
         box = face_box(mask)
-        seen = images.linear_to_srgb(np.clip(view.look.picture(rendered), 0, 1))[box]
         picture, mask = view.picture[box], mask[box]
-        seen = with_gain(seen, picture, mask)
-        distance = feature_distance(seen * mask[..., None], picture * mask[..., None])
-        found.append(
-            {
-                **differences(seen, picture, mask),
-                **({} if distance is None else {"features": float(distance[mask].mean())}),
-            }
-        )
-    return {figure: round(float(np.mean([one[figure] for one in found])), 4) for figure in found[0]}
+        srgb = images.linear_to_srgb(np.clip(view.look.picture(rendered), 0, 1))[box]
+        srgb = with_gain(srgb, picture, mask)
+        found.append(differences(srgb, picture, mask))
+        distance = feature_distance(srgb * mask[..., None], picture * mask[..., None])
+        if distance is not None:
+            found[-1]["features"] = float(distance[mask].mean())
+    return {figure: round(value, 4) for figure, value in mean_of(found).items()}
 
 
 def table(record: dict) -> str:
-    """Markdown: a line per row with the mean over the people, beside the paper's figures for its own captures."""
-    known = [figure for figure in FORMATS if figure in record["mean"][OURS]]
+    """Return Markdown: a line per row with means over people, beside the paper's figures for its own captures."""
+    columns = [figure for figure in FORMATS if figure in record["mean"][OURS]]
     lines = []
     for row, cells in record["mean"].items():
         paper = PAPER.get(row if row in PAPER else row.rsplit(" ", 1)[0])
         lines.append(
             [
                 f"**{row}**" if row == OURS else row,
-                *(FORMATS[figure].format(cells[figure]) for figure in known),
+                *(FORMATS[figure].format(cells[figure]) for figure in columns),
                 "{:.2f} dB, {:.4f}".format(*paper) if paper else None,
             ]
         )
     return figures.markdown(
-        ["mean of the people", *(TITLES[figure] for figure in known), "the paper's, on its own captures"], lines
+        ["mean of the people", *(TITLES[figure] for figure in columns), "the paper's, on its own captures"], lines
     )
 
 

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skin or light: what the split of a texture's large shapes (core/solver/extensions/split.py) is worth, alone and under
-the solve, and what it takes for granted.
+"""Measure what the split of skin and light (core/solver/extensions/split.py) is worth, alone and under the solve.
 
     python -m research.benchmarks.maps.split FOLDER [--truths FOLDER] [--only PREFIX ...] [--beside NAME=FOLDER ...]
         [--json PATH]
@@ -12,11 +11,9 @@ FOLDER holds captures as research/benchmarks/delighting/state.py measures them, 
 The closed form alone is a second of work: the texture over the global light that it finds, of each capture alone and of
 all captures of a person together; and with the scales' prior halved and doubled. --beside names folders with the same
 captures solved in another way (an earlier solver, `core run --with`). Likenesses stay where they are; only figures are
-written."""
+written.
+"""
 
-from __future__ import annotations
-
-import argparse
 import sys
 from dataclasses import asdict
 from functools import cache
@@ -41,10 +38,10 @@ from core.stages.solve.skin_tone import read_given_tone
 from .. import figures
 from ..captures import people
 from ..captures.state_captures import DELIT, SIZE, SOLVED, Filmed, add_captures, captures_asked
-from ..delighting.state_scores import in_uv, mean_of, of_person, small
+from ..delighting.state_scores import in_uv, of_person, small
 from ..measures.references import NOTHING, TRUE
-from ..measures.table import Column, Scores, format_table, summarise, to_record
-from ..pages import Sections
+from ..measures.table import Column, Scores, format_table, mean_of, summarise, to_record
+from ..pages import Sections, prose
 
 COMMAND = "python -m research.benchmarks.maps.split FOLDER --json research/records/split.json"
 ALONE, TOGETHER, LESS, MORE = (
@@ -60,36 +57,31 @@ COLUMNS = {
     "psnr_alone": Column("up to a light of its own, dB"),
     "agreement": Column("agreement, dB"),
 }
-WORDS = (
-    "Means over people ± their spread, then differences from the delit texture, person by person, ± the standard "
-    "error of their mean. *Up to one "
-    "shared light*: one grey second-order light, fitted to all captures of a person together, is no error (a "
-    "capture cannot tell it from skin, and a "
-    "scan's own map holds some); what differs between captures is. *Agreement*: PSNR of the difference between "
-    "the captures' albedos. *Split alone* is "
-    "the texture over the global light that the closed form finds, before anything is sampled; *together*, over "
-    "the light that it finds with all "
-    "captures of that person. Rows beside these are solves of the same textures by other code or options "
-    "(`--beside`): *solved before* by commit c93b420, "
-    "whose lights were held back by pulls chosen by hand, *solved together* by `core run - CAPTURE --from solve "
-    "--until solve --with OTHERS`."
-)
-PARTS = (
-    "![As filmed, delit, mean face, with traits, global light; local light, texture over light, solved, true, "
-    "deviation](../pictures/split.jpg)\n\n"
-    "A lamp from below (`python -m research.benchmarks.maps.split FOLDER --only stubbled_below --picture "
-    "docs/pictures/split.jpg`). Above: as filmed, delit, the mean face of the tone, that with the traits that "
-    "were found; the light of the whole face that the delighter left. Below: what it left locally, the delit "
-    "texture over the light of the whole face, as solved, the truth; and how large an error is expected, black "
-    "to a deviation of 0.4 in natural log. What stays is mostly the delighter's: noise in the dark, a nose whose "
-    "shadow was brightened too much."
-)
+WORDS = """
+    Means over people ± their spread, then differences from the delit texture, person by person, ± the standard error of
+    their mean. *Up to one shared light*: one grey second-order light, fitted to all captures of a person together, is
+    no error (a capture cannot tell it from skin, and a scan's own map contains some); the differences between captures
+    are. *Agreement*: PSNR of the difference between the captures' albedos. *Split alone*: the texture over the global
+    light that the closed form finds before anything is sampled; *together*: over the light that it finds with all
+    captures of that person. The other rows are solves of the same textures by other code or options (`--beside`):
+    *solved before* by commit c93b420, whose lights were held back by pulls chosen by hand, *solved together* by `core
+    run - CAPTURE --from solve --until solve --with OTHERS`.
+    """
+PARTS = """
+    ![The parts of the split, from the filmed texture to the expected error](../pictures/split.jpg)
+
+    A lamp from below (`python -m research.benchmarks.maps.split FOLDER --only stubbled_below --picture
+    docs/pictures/split.jpg`). Above: as filmed, delit, the mean face of the tone, the same with the found traits, and
+    the global light that the delighter left. Below: the local light that it left, the delit texture over the global
+    light, the solved albedo, the truth, and the expected error, black to a deviation of 0.4 in natural log. Most of the
+    rest is the delighter's: noise in the dark, a nose whose shadow was brightened too much.
+    """
 DOUBTFUL = 0.4
 """Deviation in natural log that is white in the picture."""
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "split")
     add_captures(parser)
     parser.add_argument(
         "--beside", nargs="+", default=[], metavar="NAME=FOLDER", help="the same captures, solved in another way"
@@ -99,7 +91,6 @@ def main() -> int:
         type=Path,
         help="draw the parts of the first capture instead of measuring; of synthetic people only in the docs",
     )
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     captures = captures_asked(parser, options)
     if options.picture:
@@ -109,8 +100,7 @@ def main() -> int:
     scores, by_capture, scales = measure(captures, {name: Path(path) for name, path in beside.items()})
     record = {**to_record(summarise(scores, COLUMNS, DELIT), scores), "captures": by_capture, "scales": scales}
     print("\n\n".join(f"{heading}\n\n{body}" for heading, body in sections(record)))
-    if options.json:
-        figures.write_record(options.json, "split", COMMAND, record)
+    figures.write_record(options.json, "split", COMMAND, record)
     return 0
 
 
@@ -119,8 +109,8 @@ def sections(record: dict) -> Sections:
     people, captures = {name for rows in record["people"].values() for name in rows}, record["captures"]
     found = summarise(record["people"], COLUMNS, DELIT)
     parts = [
-        ("", f"{WORDS} {len(captures)} captures of {len(people)} people."),
-        ("The parts", PARTS),
+        ("", f"{prose(WORDS)} {len(captures)} captures of {len(people)} people."),
+        ("The parts", prose(PARTS)),
         ("All people", format_table(found, COLUMNS, "taken for albedo", DELIT)),
         ("Capture by capture, up to the person's shared light, dB", capture_table(captures)),
         ("The scales that were found", scale_table(record["scales"])),
@@ -129,8 +119,7 @@ def sections(record: dict) -> Sections:
 
 
 def measure(captures: list[Filmed], beside: dict[str, Path]) -> tuple[Scores, dict, dict]:
-    """Method -> person -> figures; capture -> method -> PSNR up to the shared light; capture -> scales, of the capture
-    alone."""
+    """Return method -> person -> figures, capture -> method -> PSNR up to the shared light, and capture -> scales."""
     scores: Scores = {}
     by_capture, scales = {}, {}
     for person in dict.fromkeys(filmed.person for filmed in captures):
@@ -168,7 +157,7 @@ prior = cache(load)
 
 
 def shapes_of(filmed: Filmed) -> split.Shapes:
-    """Return what the solver would split of a capture, with the true tone."""
+    """Return the input of the solver's split for a capture, with the true tone."""
     evidence = read_evidence(filmed.capture, read_filmed_head(filmed.capture), SIZE)
     tone = read_given_tone(people.skin_tone(filmed.truth))
     if tone is None:
@@ -185,9 +174,11 @@ def divided(shapes: split.Shapes, fitted: split.Split, local: bool) -> np.ndarra
 
 
 def parts_side_by_side(filmed: Filmed) -> np.ndarray:
-    """As filmed, delit, mean face, that with traits, global light about a middle grey; local light, the texture over
-    the global light, solved, true, and the deviation of the error that is expected, black to DOUBTFUL: sRGB, at the
-    truth's tone."""
+    """Return the parts of a capture side by side, sRGB, at the truth's tone.
+
+    Above: as filmed, delit, mean face, that with traits, global light about a middle grey. Below: local light, the
+    texture over the global light, solved, true, and the expected deviation, black to DOUBTFUL.
+    """
     shapes = shapes_of(filmed)
     found = split.split_captures([shapes], make_head_cells)
     maps = small(

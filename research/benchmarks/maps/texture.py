@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Geometry and texture alone: textures of the true albedo frames, taken for the albedo, against those same frames.
+"""Score textures of the true albedo frames against those frames: geometry and texture alone.
 
 CAPTURE is registered (cameras, head.obj); TRUTH is laid out as research/benchmarks/maps/albedo_score.py says. Its
 albedo frames go through the `folder` delighter, V = those. `measure_rows` gives, per row, the score of albedo_score and
@@ -12,8 +12,6 @@ the marks of research/benchmarks/maps/detail.py:
   delit        as aligned, from the capture's own delit frames: what its delighter's errors add
 and "leave_one_out": the aligned texture scored in LEFT_OUT frames, each time built without that frame.
 """
-
-from __future__ import annotations
 
 import tempfile
 import time
@@ -38,11 +36,11 @@ from ..captures.continued import begin_at_delight, run_stages
 from .albedo_score import compare, mean_scores, read_truth
 from .detail import FaceRays, cast_face_rays, centre_rays, marks, mean_of
 
-ROWS = ("average", "blend", "aligned", "perceptual", "delit")
+ROWS = ("average", "blend", "aligned", "perceptual")
 STEPS, SIZE, LEFT_OUT = 150, 1024, 4
 
 
-def measure_rows(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS) -> dict:
+def measure_rows(capture: Capture, truth: Path) -> dict:
     """Score the textures of a capture.
 
     Raises Problem where the capture is not registered or no true frame belongs to it."""
@@ -50,18 +48,14 @@ def measure_rows(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS) ->
         raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
     head, report, results = read_head(capture), Reporter("texture"), {}
     looks = looks_of(capture, head.caster, truth)
-    if "delit" in rows and any(capture.delit.glob("*.png")):
-        results["delit"] = _row(
-            "aligned",
-            *texture.observe_all(capture, head, SIZE, report)[:2],
-            looks,
-        )
+    if any(capture.delit.glob("*.png")):
+        results["delit"] = _row("aligned", *texture.observe_all(capture, head, SIZE, report)[:2], looks)
     with tempfile.TemporaryDirectory() as folder:
         copy = begin_at_delight(capture, Path(folder) / "copy.wildcap")
         delighter = from_json({"delight": {"delighter": "folder", "folder": str(truth.absolute() / "albedo")}})
         run_stages(copy, delighter, "delight")
         observations, surface, _ = texture.observe_all(copy, head, SIZE, report)
-        for row in (row for row in rows if row != "delit"):
+        for row in ROWS:
             try:
                 results[row] = _row(row, observations, surface, looks)
             except Problem as problem:  # the perceptual network is not everywhere; the other rows are
@@ -71,13 +65,13 @@ def measure_rows(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS) ->
 
 
 def looks_of(capture: Capture, caster: raster.RayCaster, truth: Path) -> dict[str, FaceRays]:
-    """Frame name -> what its rays meet, of the registered frames with a true albedo."""
+    """Return frame name -> its rays' hits, of the registered frames with a true albedo."""
     frames = read_frames(capture).by_name
-    known = {true.frame: true for true in read_truth(truth)}
+    truths = {true.frame: true for true in read_truth(truth)}
     found = {
-        view.name: cast_face_rays(caster, view, known[frames[view.name].video_frame])
+        view.name: cast_face_rays(caster, view, truths[frames[view.name].video_frame])
         for view in read_views(capture)
-        if frames[view.name].video_frame in known
+        if frames[view.name].video_frame in truths
     }
     if not found:
         raise Problem(
@@ -98,8 +92,8 @@ def _texture(row: str, observations: list, surface) -> np.ndarray:
     """Return a row's map, sRGB [S, S, 3]. The observations are used up."""
     if row == "average":
         linear = weighted_mean([np.exp(o.log_colour) for o in observations], [o.weight for o in observations])
-        seen = 1 - np.prod([1 - o.quality for o in observations], axis=0)
-        confidence = np.where(surface.covered, seen, 0).astype(np.float32)
+        share = 1 - np.prod([1 - o.quality for o in observations], axis=0)
+        confidence = np.where(surface.covered, share, 0).astype(np.float32)
     else:
         settings = from_json({"texture": {"perceptual": STEPS if row == "perceptual" else 0}})
         built = texture.build(observations, surface, settings, Reporter("texture"), aligned=row != "blend")
@@ -108,13 +102,12 @@ def _texture(row: str, observations: list, surface) -> np.ndarray:
 
 
 def score(map_: np.ndarray, frames: Iterable[FaceRays]) -> dict:
-    """albedo_score's figures of a map, sRGB [S, S, 3], and those of research/benchmarks/maps/detail.py, means over the
-    frames."""
+    """Return the figures of a map, sRGB [S, S, 3], by albedo_score and detail, means over the frames."""
     scores, found = [], []
-    for seen in frames:
-        predicted, hit = centre_rays(seen, map_)
-        scores.append(compare(predicted, seen.true, seen.true.face & hit))
-        found.append(marks(seen, map_))
+    for rays in frames:
+        predicted, hit = centre_rays(rays, map_)
+        scores.append(compare(predicted, rays.true, rays.true.face & hit))
+        found.append(marks(rays, map_))
     mean = mean_scores(scores)
     return {
         **mean["raw"],

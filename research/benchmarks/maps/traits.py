@@ -1,18 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the split of skin and light takes traits for (core/solver/extensions/split.py), measured on skins of other
-people: how far they differ, where, over which distances, and how alike a face's two sides are.
+"""Measure how skins of other people differ: how far, where, over which distances, and between a face's sides.
 
     python -m research.benchmarks.maps.traits SKINS [--json research/records/traits.json]
 
 SKINS is what `python -m research.training carry` made of another head's skins; one of each cluster counts. What light
 is painted into a family of skins cannot be told from its traits, so both extremes are measured: all of it taken for
 traits, and all of it that the light of a sky explains (research/training/skins.py) taken out. z is a skin's difference
-from the others' median over the deviation that those others have there: one skin is left out at a time."""
+from the others' median over the deviation that those others have there: one skin is left out at a time.
+"""
 
-from __future__ import annotations
-
-import argparse
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -38,9 +35,8 @@ PAIRS = 200_000
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = figures.command_line(__doc__, "traits")
     parser.add_argument("skins", type=Path)
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     mean = load().mean_face
     record = {
@@ -48,13 +44,12 @@ def main() -> int:
         UNLIT: measure(read_shapes(options.skins, lambda skin: unshaded(skin, mean))),
     }
     print("\n\n".join(body for _, body in sections(record)))
-    if options.json:
-        figures.write_record(options.json, "traits", COMMAND, record)
+    figures.write_record(options.json, "traits", COMMAND, record)
     return 0
 
 
 def measure(found: LargeShapes) -> dict:
-    """Of one way to take the light: deviation, correlations by distance, and z-scores."""
+    """Return deviation, correlations by distance, and z-scores, with the light taken in one way."""
     rng = np.random.default_rng(0)
     i, j = rng.integers(0, len(found.places), (2, PAIRS))
     one, other = found.places[i], found.places[j]
@@ -79,7 +74,7 @@ def measure(found: LargeShapes) -> dict:
 
 
 def z_scores(found: LargeShapes) -> np.ndarray:
-    """[N, K]: each skin's difference from the median of the others, over their deviation at that place."""
+    """Return each skin's difference from the median of the others, over their deviation there, [N, K]."""
     scores = []
     for k in range(len(found.ratio)):
         rest = np.delete(found.ratio, k, 0)
@@ -99,7 +94,7 @@ def correlation_by_distance(product: np.ndarray, apart_mm: np.ndarray) -> dict[s
 
 
 def regions(places: np.ndarray) -> dict[str, np.ndarray]:
-    """Name -> bool [N] of places [N, 3] on the built-in head: five regions of the facial skin."""
+    """Return name -> bool [N] of places [N, 3] on the built-in head: five regions of the facial skin."""
     height = template.landmark_points(template.load())[:, 2]
     x, z = np.abs(places[:, 0]), places[:, 2]
     nose_base = (height[NOSE_TIP] + height[MOUTH]) / 2
@@ -131,26 +126,23 @@ def sections(record: dict) -> Sections:
         ]
         for kind, of in record.items()
     ]
-    words = prose(f"""
-        Of {painted["skins"]} painted skins of the VALID avatars, one of each base, the grey log ratio to their median,
-        by distance; hair and make-up are left out. What light is painted into such skins and what their traits are
-        cannot be told apart: *as painted* takes all for traits, *light taken out* none that a sky explains. The split
-        ([skin or light](split.md)) takes exp(-distance / {1e3 * split.TRAIT_REACH_M:.0f} mm), and
-        {split.MIRROR_CORRELATION} of it with the mirror image, midway; where skins differ more than elsewhere
-        (`core/weights/traits.json`), traits may be larger.
-        """)
+    words = f"""
+        The grey log ratio of {painted["skins"]} painted skins of the VALID avatars, one of each base, to their median,
+        by distance; hair and make-up are left out. Light that is painted into such skins cannot be told from their
+        traits: *as painted* takes all for traits, *light taken out* nothing that a sky explains. The split ([skin or
+        light](split.md)) takes exp(-distance / {1e3 * split.TRAIT_REACH_M:.0f} mm), and {split.MIRROR_CORRELATION} of
+        it with the mirror image, midway; where skins differ more than elsewhere (`core/weights/traits.json`), traits
+        may be larger.
+        """
+    z_words = """
+        Standard deviation of a skin's z-scores, its difference from the other skins over theirs at that place, one left
+        out at a time: of all (goal: 0.8 to 1.25), of the skin with the least and the most, and of all by region (goal:
+        0.6 to 1.6).
+        """
+    z_table = figures.markdown(["z, light painted into the skins", "all", "least", "most", *names], scores)
     return [
-        ("How skins differ", words + "\n\n" + figures.markdown(head, rows)),
-        (
-            "How well that holds for others",
-            prose("""
-        Standard deviation of a skin's z-scores, its difference from the other skins over theirs at that place, one
-        left out at a time: of all (aim: 0.8 to 1.25), of the skin with the least and the most, and of all by region
-        (aim: 0.6 to 1.6).
-        """)
-            + "\n\n"
-            + figures.markdown(["z, light painted into the skins", "all", "least", "most", *names], scores),
-        ),
+        ("How skins differ", prose(words, figures.markdown(head, rows))),
+        ("How well that holds for others", prose(z_words, z_table)),
     ]
 
 

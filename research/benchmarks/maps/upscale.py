@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Four times as many texels of a side: the network against Lanczos on subjects that no training saw, and what the
-frames add.
+"""Compare the upscaling network with Lanczos on subjects that no training saw, and measure what the frames add.
 
     python -m research.benchmarks.maps.upscale [--work DIR] [--json FILE]
                                  [--picture docs/pictures/upscale.jpg]
@@ -14,9 +13,6 @@ correlation with the truth of what is finer than a texel of the 1024 map, moles 
 it. cost: 1024 to 4096 in a process of its own, seconds and peak memory.
 """
 
-from __future__ import annotations
-
-import argparse
 import resource
 import tempfile
 import time
@@ -47,7 +43,9 @@ from ...people.parameters import sample_parameters
 from ...people.skin import make_skin
 from ...training.fine_windows import CHANNELS, FACTOR, Degradation, degraded, prepare
 from ..captures.shadow_captures import render_picture, write_views
-from ..figures import markdown, write_record
+from ..figures import command_line, markdown, write_record
+from ..measures.table import mean_of
+from ..pictures.sheet import in_rows
 from .ablation_measures import feature_distance
 from .detail import moles
 
@@ -63,68 +61,47 @@ CLOSE = 9.0
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__, "upscale")
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_upscale_benchmark")
-    parser.add_argument(
-        "--json",
-        type=Path,
-        help="where the figures go, such as research/records/upscale.json; those of other rows stay",
-    )
     parser.add_argument("--picture", type=Path, help="close-ups of small map, Lanczos, network and truth side by side")
-    arguments = parser.parse_args()
-    arguments.work.mkdir(parents=True, exist_ok=True)
-    found = {"enlarging": enlarging(arguments.work, arguments.picture), "frames": from_frames(arguments.work)}
+    options = parser.parse_args()
+    options.work.mkdir(parents=True, exist_ok=True)
+    found = {"enlarging": enlarging(options.work, options.picture), "frames": from_frames(options.work)}
     # each in a fresh process, whose peak is its own
     with ProcessPoolExecutor(1, mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:
         found["cost"] = dict(zip(METHODS, pool.map(cost, METHODS), strict=True))
-    for name, rows in found.items():
+    record = {}
+    for part, rows in found.items():
         columns = next(iter(rows.values()))
-        print(
-            markdown(
-                [name, *columns],
-                [[row, *(f"{values[column]:.4g}" for column in columns)] for row, values in rows.items()],
-            ),
-            end="\n\n",
-        )
-    if arguments.json:
-
-        def keys(figures_by_name: dict[str, float]) -> dict[str, float]:
-            return {figure.lower().replace(" ", "_"): value for figure, value in figures_by_name.items()}
-
-        keyed = {
-            part: {row.replace("lanczos", "Lanczos"): keys(values) for row, values in rows.items()}
-            for part, rows in found.items()
+        lines = [[row, *(f"{values[column]:.4g}" for column in columns)] for row, values in rows.items()]
+        print(markdown([part, *columns], lines), end="\n\n")
+        record[part] = {
+            row.replace("lanczos", "Lanczos"): {key.lower().replace(" ", "_"): value for key, value in values.items()}
+            for row, values in rows.items()
         }
-        write_record(arguments.json, "upscale", "python -m research.benchmarks.maps.upscale", keyed, keep=True)
+    write_record(options.json, "upscale", "python -m research.benchmarks.maps.upscale", record, keep=True)
 
 
 def enlarging(work: Path, sheet: Path | None = None) -> dict[str, dict[str, float]]:
-    """Figures per kind of reduction and method, each the mean over the subjects' windows."""
+    """Return figures per kind of reduction and method, means over the subjects' windows."""
     prepare(list(SEEDS), VIEWS, work, Reporter("upscale"), 1)
-    found, shots = {}, []
+    rows, shots = {}, []
     for kind, how in KINDS.items():
-        scores = {method: [] for method in METHODS}
-        for seed in SEEDS:
-            for view in range(VIEWS):
-                large = np.load(work / f"window_{seed}_{view}.npy").astype(np.float32)
-                small = degraded(large, how, np.random.default_rng([seed, view]))
-                true = np.moveaxis(large, 0, -1)
-                results = {method: _enlarged(small, method) for method in scores}
-                for method, result in results.items():
-                    scores[method].append(compare(result, true))
-                if view == 0 and kind == "soft":
-                    shots.append(_closeup(small, {method: results[method] for method in METHODS}, true))
-        found |= {
-            f"{kind}, {method}": {name: round(float(np.mean([s[name] for s in rows])), 4) for name in rows[0]}
-            for method, rows in scores.items()
-        }
+        for seed, view in ((seed, view) for seed in SEEDS for view in range(VIEWS)):
+            large = np.load(work / f"window_{seed}_{view}.npy").astype(np.float32)
+            small, true = degraded(large, how, np.random.default_rng([seed, view])), np.moveaxis(large, 0, -1)
+            results = {method: _enlarged(small, method) for method in METHODS}
+            for method, result in results.items():
+                rows.setdefault(f"{kind}, {method}", []).append(compare(result, true))
+            if view == 0 and kind == "soft":
+                shots.append(_closeup(small, results, true))
     if sheet:
-        images.write_srgb(sheet, np.vstack([np.hstack(shots[:2]), np.hstack(shots[2:4])]), quality=86)
-    return found
+        images.write_srgb(sheet, in_rows(shots[:4], 2), quality=86)
+    return {name: rounded_mean(found) for name, found in rows.items()}
 
 
 def compare(result: np.ndarray, true: np.ndarray) -> dict[str, float]:
-    """Figures of enlarged maps [H, W, 7] (sRGB diffuse, unit normal, specular) against true ones."""
+    """Return the figures of enlarged maps [H, W, 7] (sRGB diffuse, unit normal, specular) against true ones."""
     result, true = (maps[BORDER:-BORDER, BORDER:-BORDER] for maps in (result, true))
     figures = {}
     for name, channels in (("diffuse", slice(0, 3)), ("specular", slice(6, 7)), ("normal", slice(3, 6))):
@@ -147,7 +124,7 @@ def compare(result: np.ndarray, true: np.ndarray) -> dict[str, float]:
 
 
 def cost(method: str, size: int = 1024) -> dict[str, float]:
-    """Seconds and peak memory in GiB of enlarging maps of that size, in the process it is called in."""
+    """Return seconds and peak memory in GiB of enlarging maps of that size, in this process."""
     rng, blank = np.random.default_rng(0), np.ones((size, size, 3), np.float32)
     maps = HeadMaps(
         rng.random((size, size, 3), np.float32),
@@ -164,7 +141,7 @@ def cost(method: str, size: int = 1024) -> dict[str, float]:
 
 
 def _enlarged(small: np.ndarray, method: str) -> np.ndarray:
-    """Maps [7, H, W] in the network's channels, four times as large: [4H, 4W, 7]."""
+    """Return maps [7, H, W] in the network's channels, four times as large: [4H, 4W, 7]."""
     diffuse, normal = images.srgb_to_linear(np.moveaxis(small[:3], 0, -1)), np.moveaxis(small[3:6], 0, -1)
     blank = np.ones_like(diffuse)
     maps = HeadMaps(diffuse, normal, small[6], blank[..., 0], blank, blank[..., 0])
@@ -172,8 +149,7 @@ def _enlarged(small: np.ndarray, method: str) -> np.ndarray:
 
 
 def _closeup(small: np.ndarray, results: dict[str, np.ndarray], true: np.ndarray, side: int = 176) -> np.ndarray:
-    """Return the small map, each method and the truth side by side, diffuse above normals, where the truth has most
-    detail."""
+    """Return small map, methods and truth side by side, diffuse above normals, where the truth has most detail."""
     log = cv2.GaussianBlur(np.abs(cv2.Laplacian(true[..., 1], cv2.CV_32F)), (0, 0), side / 4)[side:-side, side:-side]
     row, column = (int(at) + side // 2 for at in np.unravel_index(log.argmax(), log.shape))
     nearest = np.repeat(np.repeat(np.moveaxis(small, 0, -1), FACTOR, 0), FACTOR, 1)
@@ -185,29 +161,28 @@ def _closeup(small: np.ndarray, results: dict[str, np.ndarray], true: np.ndarray
 
 
 def from_frames(work: Path) -> dict[str, dict[str, float]]:
-    """Figures of each method without and with the frames' own detail, means over the subjects."""
+    """Return the figures of each method without and with the frames' own detail, means over the subjects."""
     rows: dict[str, list] = {}
     for seed in FILMED:
         capture, true = filmed(seed, work / f"filmed_{seed}.wildcap")
-        small = _stacked(true)
-        solved = degraded(small, replace(KINDS["soft"], relief=1.0), np.random.default_rng(seed))
-        seen = cv2.resize(images.read_mask(capture.texture_confidence), (len(true),) * 2) > 0.5
-        seen &= template.mask("face", 1024).repeat(2, 0).repeat(2, 1) > 0.5
+        solved = degraded(_stacked(true), replace(KINDS["soft"], relief=1.0), np.random.default_rng(seed))
+        visible = cv2.resize(images.read_mask(capture.texture_confidence), (len(true),) * 2) > 0.5
+        visible &= template.mask("face", 1024).repeat(2, 0).repeat(2, 1) > 0.5
         for method in METHODS:
             plain = images.resize(_enlarged(solved, method)[..., :3], *true.shape[1::-1])
             guided = plain.copy()
             detail.guide(guided, images.read_data(capture.texture_detail), 1024, lambda done: None)
             for name, albedo in ((method, plain), (f"{method}, with the frames", guided)):
-                rows.setdefault(name, []).append(_fine_figures(albedo, true, seen))
-    return {
-        name: {figure: round(float(np.mean([r[figure] for r in found])), 4) for figure in found[0]}
-        for name, found in rows.items()
-    }
+                rows.setdefault(name, []).append(_fine_figures(albedo, true, visible))
+    return {name: rounded_mean(found) for name, found in rows.items()}
+
+
+def rounded_mean(rows: list[dict[str, float]]) -> dict[str, float]:
+    return {figure: round(value, 4) for figure, value in mean_of(rows).items()}
 
 
 def filmed(seed: int, folder: Path) -> tuple[Capture, np.ndarray]:
-    """Return a capture of a reserved subject in even light, with its texture made, and its true albedo, sRGB [2048,
-    2048, 3]. Made once."""
+    """Return a reserved subject's capture in even light with its texture, and its albedo, sRGB [2048, 2048, 3]."""
     capture = Capture(folder)
     if not (capture.root / "truth.png").is_file():
         mesh, rng = subject_mesh(seed), np.random.default_rng([seed, 50])
@@ -225,8 +200,7 @@ def filmed(seed: int, folder: Path) -> tuple[Capture, np.ndarray]:
 
 
 def _stacked(srgb: np.ndarray) -> np.ndarray:
-    """Return the network's channels of an albedo at 2048 on smooth skin, at 4096, of which a solver's map is a quarter:
-    [7, 4096, 4096]."""
+    """Return the network's channels [7, 4096, 4096] of an albedo at 2048 on smooth skin."""
     maps = np.zeros((CHANNELS, 4096, 4096), np.float32)
     maps[:3] = srgb.repeat(2, 0).repeat(2, 1).transpose(2, 0, 1)
     maps[5], maps[6] = 1, 0.35

@@ -1,16 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Problems in UV space with known truth, for measuring the solver: subjects that no training saw, lit and shadowed as
-the paper assumes, not quite.
+"""UV-space problems with known truth: subjects that no training saw, lit not quite as the paper assumes.
 
 texture = albedo * (global SH + the rest) * shadow, blurred by a texel, with noise. The global SH are fitted to a sky
 with its occlusion and a sun; the rest is what they cannot explain, scaled to 10 % of the light; shadow is what cast
 shadows leave of it, per channel. Of kind "delit" the shading is nearly flat already, 30 to 60 % of each shadow is left
-and the colour is off by a few percent over large regions, as a delighter leaves its frames. A
-`make_plain_problem` has a sky and a sun as they are, and noise.
+and the colour is off by a few percent over large regions, as a delighter leaves its frames.
 """
-
-from __future__ import annotations
 
 import hashlib
 import tempfile
@@ -26,7 +22,7 @@ from core.capture.capture import Capture
 from core.capture.files import replacing
 from core.capture.messages import Reporter
 from core.face import template
-from core.geometry import meshes, raster
+from core.geometry import meshes
 from core.imaging import images
 from core.solver.lighting import fit_global, shading_basis
 from core.stages.solve.skin_tone import GIVEN, SkinTone
@@ -36,6 +32,7 @@ from ...people.light import bake, random_light
 from ...people.parameters import sample_parameters
 from ...people.skin import make_skin
 from ...training.carry import carry
+from ..figures import SHARED
 
 SHADOWS = {"leaves, hard": ("leaves", 0.005), "edge, half soft": ("edge", 0.012), "blinds, soft": ("blinds", 0.025)}
 """Name -> (what throws it, angular radius of the sun in radians). The head's own shadow (nose, brow, chin) falls on
@@ -45,14 +42,17 @@ MASKED = 0.12, 0.5
 skin nearly black."""
 UNEXPLAINED = 0.10  # of the light, root mean square: what second-order SH cannot explain
 NOISE = 0.004  # deviation, linear
-LEE_PERRY_SMITH = Path(__file__).parents[4] / "shared" / "data" / "lee_perry_smith"
+LEE_PERRY_SMITH = SHARED / "lee_perry_smith"
 CACHE = Path(tempfile.gettempdir()) / "wildcap_ablation"
 
 
 @dataclass(frozen=True)
 class MaskedUvProblem:
-    """float32, linear. albedo, texture [S, S, 3]; shadow [S, S]: the blocked share of the sun; mask [S, S]: M as an
-    artist would paint it, a bit too large."""
+    """A problem, float32, linear.
+
+    albedo, texture [S, S, 3]; shadow [S, S]: the blocked share of the sun; mask [S, S]: M as an artist would paint it,
+    a bit too large.
+    """
 
     albedo: np.ndarray
     texture: np.ndarray
@@ -61,25 +61,24 @@ class MaskedUvProblem:
 
     @property
     def face(self) -> np.ndarray:
-        """bool [S, S]"""
+        """Return the texels of the face, bool [S, S]."""
         return template.mask("face", len(self.albedo)) > 0.5
 
     @property
     def tone(self) -> SkinTone:
-        """Return the true skin's, eyes left out."""
+        """Return the true skin's tone, eyes left out."""
         skin = skin_weight(len(self.albedo))
         return SkinTone.from_linear((self.albedo * skin[..., None]).sum((0, 1)) / skin.sum(), GIVEN)
 
     def write(self, capture: Capture) -> None:
-        """What the solver reads of a capture: a texture that was seen all over, the mask, the built-in head."""
+        """Write the solver's inputs of a capture: a texture that was seen all over, the mask, the built-in head."""
         images.write_linear(capture.texture, self.texture)
         images.write_data(capture.texture_confidence, np.ones(self.shadow.shape, np.float32))
         images.write_data(capture.shadow_mask_auto, self.mask)
         meshes.write_obj(capture.head, template.load())
 
     def regions(self) -> dict[str, np.ndarray]:
-        """Name -> bool [S, S]: in the shadow, in a band of 12 texels (of a 1024 map) to either side of its border, and
-        outside."""
+        """Return name -> bool [S, S]: shadow, a band of 12 texels (of 1024) at its border, and outside."""
         edge = cv2.morphologyEx((self.shadow > 0.5).astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
         band = cv2.dilate(edge, np.ones((25 * len(self.albedo) // 1024 | 1,) * 2, np.uint8)) > 0
         return {
@@ -103,28 +102,17 @@ def make_problem(subject: str, shadows: str, size: int, kind: str = "raw") -> Ma
         kept = 1 - rng.uniform(0.3, 0.6) * (1 - kept)
     lit = albedo * shading * kept
     lit *= 0.8 / np.percentile(lit[face].max(-1), 99.5)
-    seen = cv2.GaussianBlur(lit, (3, 3), 0.5) + rng.normal(0, NOISE, lit.shape)
-    return MaskedUvProblem(albedo, np.maximum(seen, 0).astype(np.float32), shadow, _painted(shadow))
-
-
-def make_plain_problem(seed: int, shadows: str, size: int) -> MaskedUvProblem:
-    """Return a subject of research/people in a random light of that seed; `shadows`: self, leaves, blinds or edge."""
-    rng, albedo = np.random.default_rng([seed, 7]), albedo_of(str(seed), size)
-    shading, shadow, _ = bake(template.load(), size, random_light(rng), shadows, rng)
-    covered = raster.rasterize_uv(template.load(), size)[0] >= 0
-    bright = np.percentile((albedo * shading)[covered].max(-1), 99.5)
-    exposure = min(rng.uniform(0.7, 1.1) / np.percentile(shading[covered].mean(-1), 90), 1 / bright)
-    seen = albedo * (shading * exposure) + np.random.default_rng(seed).normal(0, NOISE, albedo.shape)
-    return MaskedUvProblem(albedo, np.maximum(seen, 0).astype(np.float32), shadow, _painted(shadow))
+    filmed = cv2.GaussianBlur(lit, (3, 3), 0.5) + rng.normal(0, NOISE, lit.shape)
+    return MaskedUvProblem(albedo, np.maximum(filmed, 0).astype(np.float32), shadow, _painted(shadow))
 
 
 def skin_weight(size: int) -> np.ndarray:
-    """[S, S] in [0, 1]: skin, eyes left out."""
+    """Return the weight of the skin in [0, 1], [S, S], eyes left out."""
     return template.mask("skin", size) * (1 - template.mask("eyes", size))
 
 
 def albedo_of(subject: str, size: int) -> np.ndarray:
-    """Linear [S, S, 3]. Real skins are maps of colour: what little light is painted into them counts as theirs."""
+    """Return a linear albedo [S, S, 3]; light that is painted into real skins counts as theirs."""
     if subject.isdigit():
         return make_skin(sample_parameters(int(subject)), size).diffuse
     path = lee_perry_smith() if subject == LEE_PERRY_SMITH.name else Path(subject)
@@ -132,8 +120,7 @@ def albedo_of(subject: str, size: int) -> np.ndarray:
 
 
 def lee_perry_smith() -> Path:
-    """Return the scan's colour map in our UVs, carried there once and kept outside of this repository (the scan is CC
-    BY and no part of it)."""
+    """Return the scan's colour map in our UVs, carried once and kept outside of this repository (CC BY)."""
     out = CACHE / "lee_perry_smith"
     if not (out / "carried.json").is_file():
         scan = trimesh.load(LEE_PERRY_SMITH / "LeePerrySmith.glb").geometry["LeePerrySmith"]
@@ -152,8 +139,7 @@ def lee_perry_smith() -> Path:
 
 
 def _chosen_light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the first usable one of the random lights; kept in CACHE under a name that changes with the sources it
-    comes from."""
+    """Return the first usable random light, kept in CACHE under a key of the sources it comes from."""
     sources = b"".join(Path(module).read_bytes() for module in (__file__, light.__file__))
     key = hashlib.blake2b(repr((shadows, seeds, size)).encode() + sources, digest_size=12).hexdigest()
     stored = CACHE / f"light_{key}.npz"
@@ -167,8 +153,7 @@ def _chosen_light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.n
 
 
 def _light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return a random light: shading without cast shadows [S, S, 3], the share of it that these leave [S, S, 3], and
-    the blocked share of the sun [S, S]."""
+    """Return shading without cast shadows [S, S, 3], the share that these leave [S, S, 3], and the shadow [S, S]."""
     thrown_by, radius = SHADOWS[shadows]
     rng = np.random.default_rng(seeds)
     drawn = replace(random_light(rng), radius=radius)
@@ -202,16 +187,16 @@ def _painted(shadow: np.ndarray) -> np.ndarray:
 
 
 def _sh_part(shading: np.ndarray, normal: np.ndarray, face: np.ndarray) -> np.ndarray:
-    """[S, S, 3]: the second-order SH of the normals that are nearest to a shading on the face."""
+    """Return the second-order SH of the normals that are nearest to a shading on the face, [S, S, 3]."""
     basis = shading_basis(torch.from_numpy(np.ascontiguousarray(normal.transpose(2, 0, 1), np.float32)))
-    wanted = torch.from_numpy(np.ascontiguousarray(shading.transpose(2, 0, 1), np.float32))
-    gamma = fit_global(wanted, torch.ones_like(wanted), basis, torch.from_numpy(face.astype(np.float32)), ridge=1e-4)
+    target = torch.from_numpy(np.ascontiguousarray(shading.transpose(2, 0, 1), np.float32))
+    gamma = fit_global(target, torch.ones_like(target), basis, torch.from_numpy(face.astype(np.float32)), ridge=1e-4)
     fitted = torch.einsum("ck,khw->hwc", gamma, basis).numpy()
     return np.maximum(fitted, 0.02 * fitted[face].mean())
 
 
 def _slow(rng: np.random.Generator, size: int) -> np.ndarray:
-    """[S, S, 3]: fields of deviation one that vary over about a sixth of the map, mostly in lightness."""
+    """Return fields of deviation one that vary over about a sixth of the map, mostly in lightness, [S, S, 3]."""
     shared, own = rng.normal(size=(7, 7, 1)), rng.normal(size=(7, 7, 3))
     field = cv2.resize(0.8 * shared + 0.6 * own, (size, size), interpolation=cv2.INTER_CUBIC)
     return (field / field.std()).astype(np.float32)

@@ -1,12 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether an uncertainty is one: log-likelihood of the errors under it, against the best that one number for all could
-do, and coverage of one sigma.
+"""Calibration of an uncertainty: likelihood of the errors against the best constant, and coverage of one sigma.
 
 Errors and sigmas are differences of natural logarithms of albedo, or of anything else that both share; [N].
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -15,8 +12,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Calibration:
-    """likelihood: mean negative log-likelihood in nats; constant: the same under the best constant sigma; gained: how
-    much lower the first is; coverage: share of the errors within one sigma; count: how many there are."""
+    """Mean negative log-likelihood in nats, that of the best constant sigma, coverage of one sigma, and count."""
 
     likelihood: float
     constant: float
@@ -29,8 +25,7 @@ class Calibration:
 
 
 def negative_log_likelihood(error: np.ndarray, sigma: np.ndarray | float) -> float:
-    """Mean of (e / s)^2 / 2 + log s + log(2 pi) / 2 over errors [N] of zero mean, in nats. Raises ValueError for a
-    sigma that is not positive."""
+    """Return the mean of (e / s)^2 / 2 + log s + log(2 pi) / 2 over errors [N], in nats."""
     sigma = np.asarray(sigma, np.float64)
     if not (sigma > 0).all():
         raise ValueError("a standard deviation is positive")
@@ -38,7 +33,7 @@ def negative_log_likelihood(error: np.ndarray, sigma: np.ndarray | float) -> flo
 
 
 def calibrate(error: np.ndarray, sigma: np.ndarray) -> Calibration:
-    """Of errors [N] and their sigmas [N]. The best constant is the errors' root mean square."""
+    """Calibrate errors [N] and their sigmas [N]; the best constant is the root mean square error."""
     best = max(float(np.sqrt(np.mean(np.asarray(error, np.float64) ** 2))), 1e-12)
     return Calibration(
         negative_log_likelihood(error, sigma),

@@ -1,14 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an answer leaves along the edges of the true shadow, cast and self-shadow: a step, a line, and too little
-detail.
+"""Measure what an answer leaves along the edges of the true shadow: a step, a line, and lost detail.
 
 The residual log(answer / truth), green, is followed across the edge. A step is light that stayed (or was taken twice);
 a line brighter or darker than both sides is what a border that was misplaced or blurred leaves, and an eye sees it
 first. Lengths are shares of the face's height, so that pictures of any size compare.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -32,10 +29,11 @@ LEAST_PIXELS = 200
 
 @dataclass(frozen=True)
 class EdgeScores:
-    """Of one picture, differences of natural logarithms, means over the pixels of the edge: step, the lit side less the
-    dark one, with its sign; bright and dark, how far the line lies above or below both sides; overshoot, their sum.
-    Then the correlation of the detail with the truth's within the band of the edge, and away from it. None where there
-    is no such edge."""
+    """Figures of one picture, differences of natural logarithms, means over the pixels of the edge.
+
+    step: the lit side less the dark one; bright, dark: how far the line lies above or below both sides; overshoot:
+    their sum; detail: correlation with the truth's within the band of the edge, and away from it. None without an edge.
+    """
 
     step: float | None
     bright: float | None
@@ -93,8 +91,7 @@ def _between(distance: np.ndarray, height: float) -> np.ndarray:
 def _detail(
     log: np.ndarray, log_true: np.ndarray, mask: np.ndarray, band: np.ndarray
 ) -> tuple[float | None, float | None]:
-    """Correlation of the two logarithms between 1 and 3 px, as pictures.detail has it, within a band [H, W] and off
-    it."""
+    """Return the correlation of the fine bands of two logarithms within a band [H, W] and off it."""
     (one, true), inner = pictures.fine_bands(log, log_true, mask)
     within, away = (
         pictures.correlation(one[where], true[where]) if where.sum() >= LEAST_PIXELS else None

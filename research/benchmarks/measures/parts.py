@@ -1,12 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skin, brows, lips and beard scored apart: a mean over a face is a mean over its skin, and hides what became of the
-rest.
+"""Scores of skin, brows, lips and beard apart: a mean over a face is a mean over its skin.
 
 All parts share the one gain per channel of the whole face: a brow that is bleached is an error, not a tone.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -20,8 +17,7 @@ LEAST_TEXELS = 100
 
 @dataclass(frozen=True)
 class PartScore:
-    """psnr in dB, in sRGB; bias: median of the grey log(answer / truth), above 0 where the part is too bright;
-    deviation: its standard deviation within the part; texels: how many there are."""
+    """PSNR in dB (sRGB), median and deviation of the grey log(answer / truth) of a part, and its texels."""
 
     psnr: float
     bias: float
@@ -30,7 +26,7 @@ class PartScore:
 
 
 def score_parts(answer: np.ndarray, truth: np.ndarray, regions: dict[str, np.ndarray]) -> dict[str, PartScore]:
-    """Linear colours of the face's texels [N, 3]; regions: bool [N] each. Parts of few texels are left out."""
+    """Score linear colours of the face's texels [N, 3] in regions, bool [N]; small parts are left out."""
     toned = to_tone(answer, truth.mean(0))
     ratio = log_ratio(toned, truth)
     return {

@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measure of one picture against its truth: PSNR, SSIM, FLIP, the pores' correlation, and what is left of a shadow's
-step.
+"""Measures of one picture against its truth: PSNR, SSIM, FLIP, detail, and the rest of a shadow's step.
 
 Pictures are sRGB float32 [H, W, 3] in [0, 1], masks bool [H, W]. The gain per channel, in linear light, takes out what
 a skin tone would supply.
 """
-
-from __future__ import annotations
 
 import math
 
@@ -20,25 +17,25 @@ from core.imaging import images
 
 
 def face_box(mask: np.ndarray) -> tuple[slice, slice]:
-    """Rows and columns about a mask [H, W], by a margin wider than any of the measures' filters."""
+    """Return rows and columns about a mask [H, W], by a margin wider than any of the measures' filters."""
     return tuple(
         slice(max(side[0] - 40, 0), side[-1] + 41) for side in (np.flatnonzero(mask.any(axis)) for axis in (1, 0))
     )
 
 
 def with_gain(predicted: np.ndarray, true: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """sRGB [H, W, 3] after the gain per channel, in linear light, that gives it the truth's mean over the mask."""
+    """Return a picture with the gain per channel, in linear light, that gives it the truth's mean over the mask."""
     linear_true, linear = images.srgb_to_linear(true), images.srgb_to_linear(predicted)
     return images.linear_to_srgb(linear * (linear_true[mask].mean(0) / np.maximum(linear[mask].mean(0), 1e-6)))
 
 
 def log_green(srgb: np.ndarray) -> np.ndarray:
-    """sRGB [H, W, 3] -> logarithm of linear green [H, W]."""
+    """Return the logarithm of linear green [H, W] of sRGB [H, W, 3]."""
     return np.log(np.maximum(images.srgb_to_linear(srgb)[..., 1], 1e-3))
 
 
 def differences(predicted: np.ndarray, true: np.ndarray, mask: np.ndarray) -> dict:
-    """PSNR in dB, SSIM and FLIP of sRGB pictures [H, W, 3] over a mask, both grey outside of it."""
+    """Return PSNR in dB, SSIM and FLIP of sRGB pictures [H, W, 3] over a mask, both grey outside of it."""
     a, b = (np.where(mask[..., None], picture, 0.5).astype(np.float64) for picture in (predicted, true))
     error = ((a - b)[mask] ** 2).mean()
     _, ssim = structural_similarity(a, b, channel_axis=2, data_range=1.0, full=True)
@@ -53,14 +50,13 @@ def differences(predicted: np.ndarray, true: np.ndarray, mask: np.ndarray) -> di
 
 
 def detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray) -> float:
-    """Correlation of two logarithms [H, W] between 1 and 3 px; 0 where the first is flat."""
+    """Return the correlation of two logarithms [H, W] between 1 and 3 px; 0 if the first is flat."""
     fine, inner = fine_bands(log, log_true, mask)
     return correlation(*(band[inner] for band in fine))
 
 
 def fine_bands(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-    """Return what the two vary by between 1 and 3 px, [H, W] each, and where nothing from off the mask is in it, bool
-    [H, W]."""
+    """Return the bands of both between 1 and 3 px, [H, W], and the pixels unaffected by the rest, bool [H, W]."""
     fine = []
     for picture in (log, log_true):
         picture = np.where(mask, picture, picture[mask].mean()).astype(np.float64)
@@ -69,13 +65,15 @@ def fine_bands(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray) -> tuple
 
 
 def correlation(one: np.ndarray, true: np.ndarray) -> float:
-    """Of values [N]; 0 where the first are alike."""
+    """Return the correlation of values [N]; 0 if the first are alike."""
     return float(np.corrcoef(one, true)[0, 1]) if one.std() > 1e-9 else 0.0
 
 
 def shadow_step(residual: np.ndarray, mask: np.ndarray, shadow: np.ndarray) -> float:
-    """Median of log(predicted / true) [H, W] along the lit side of the shadow's edge less the dark side's; nan where
-    the boundary is too short to speak of."""
+    """Return the median of log(predicted / true) [H, W] on the lit side of the shadow's edge less the dark.
+
+    nan if the edge is too short.
+    """
     sides = [residual[band & mask] for band in edge_bands(shadow)]
     return float(np.median(sides[0]) - np.median(sides[1])) if min(map(len, sides)) > 500 else math.nan
 

@@ -1,14 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The answers that stand in every table beside a method's, made like any other: they say what a measure is worth.
+"""Reference answers that stand in every table beside a method's.
 
 doing nothing     the picture or texture as filmed: keeps all of the face, and all of the light
 flat colour       one colour everywhere: no light, and no face
 blur divided out  what one does by hand: keeps what is small, light and skin alike
 true light        the true light divided out: what the registration and the texture leave
 """
-
-from __future__ import annotations
 
 import cv2
 import numpy as np
@@ -20,13 +18,12 @@ DARKEST = 1e-3
 
 
 def flat_colour(filmed: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Return the filmed picture's mean over the pixels bool [H, W], everywhere; linear [H, W, 3]."""
+    """Return the filmed picture's mean over the pixels, bool [H, W], everywhere; linear [H, W, 3]."""
     return np.broadcast_to(filmed[mask].mean(0), filmed.shape).astype(np.float32)
 
 
 def blur_divided_out(filmed: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Linear [H, W, 3] over its own blur, each channel apart, times the mean; only the pixels `mask` bool [H, W] enter
-    the blur."""
+    """Return linear [H, W, 3] over its own blur within the mask, bool [H, W], each channel apart."""
     deviation = BLURRED * face_height(mask)
     weight = mask.astype(np.float32)
     share = np.maximum(cv2.GaussianBlur(weight, (0, 0), deviation), 1e-4)[..., None]
@@ -37,6 +34,6 @@ def blur_divided_out(filmed: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def face_height(mask: np.ndarray) -> float:
-    """Rows that a mask [H, W] spans."""
+    """Return the number of rows that a mask [H, W] spans."""
     rows = np.flatnonzero(mask.any(1))
     return float(rows[-1] - rows[0] + 1) if len(rows) else 1.0

@@ -11,8 +11,6 @@ is linear. Least squares with Huber's weights (Huber 1964), so that a shadow tha
 bend a light that is not.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,23 +28,22 @@ TO_DEVIATION = 1.4826
 
 @dataclass(frozen=True)
 class SharedLight:
-    """coefficients [9] of the orthonormal functions; deviation: the standard deviation of the light's logarithm over
-    the texels it was fitted to."""
+    """Coefficients [9] of the orthonormal functions, and the deviation of the light's logarithm over its texels."""
 
     coefficients: np.ndarray
     deviation: float
 
 
 def log_ratio(answer: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """Grey log(answer / truth): the mean over channels of the logarithms; linear [..., 3] -> [...]."""
+    """Return the grey log(answer / truth), the mean over channels; linear [..., 3] -> [...]."""
     return (np.log(np.maximum(answer, DARKEST)) - np.log(np.maximum(truth, DARKEST))).mean(-1)
 
 
 def fit_light(ratios: list[np.ndarray], normals: list[np.ndarray]) -> SharedLight:
-    """One light for all captures. Per capture a grey log ratio [N_k] and unit normals [N_k, 3] in axes of the head;
-    each capture has the same say.
+    """Fit one light to all captures, each of the same weight.
 
-    The captures' exposures are not the light's: each ratio is taken about its own median.
+    Per capture: a grey log ratio [N_k], taken about its own median, since exposures are not the light's, and unit
+    normals [N_k, 3] in axes of the head.
     """
     basis = np.concatenate([sh_basis(np.asarray(n, np.float64)) for n in normals])
     value = np.concatenate([np.asarray(r, np.float64) - np.median(r) for r in ratios])

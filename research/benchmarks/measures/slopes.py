@@ -8,8 +8,6 @@ not in proportion); a flat colour 0 and 0. No answer that treats pigment and lig
 number for both.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 DARKEST = 1e-3
@@ -18,11 +16,11 @@ DARKEST = 1e-3
 def slope(
     answers: tuple[np.ndarray, np.ndarray], causes: tuple[np.ndarray, np.ndarray], mask: np.ndarray
 ) -> float | None:
-    """Return how far the change between two answers follows the change between their causes: least squares over the
-    pixels `mask` bool [H, W], all channels.
+    """Return the slope of the change between two answers on the change between their causes, by least squares.
 
-    causes: the two true albedos, or the two pictures; linear [H, W, 3]. Changes are of logarithms, each channel
-    about its mean, for a gain is not judged. None where the causes hardly differ (by less than 1 % in deviation)."""
+    causes: the two true albedos, or the two pictures; linear [H, W, 3]; mask: bool [H, W]. Changes are of logarithms,
+    each channel about its mean, for a gain is not judged. None if the causes differ by less than 1 % in deviation.
+    """
     moved, cause = (_change(pair, mask) for pair in (answers, causes))
     return float((moved * cause).sum() / (cause * cause).sum()) if cause.std() > 0.01 else None
 

@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one form of table: methods down, measures across; per cell the mean over people and their spread, and of each
-method's difference from another, person by person, the mean and its standard error.
+"""Tables with methods down, measures across: means over people, and paired differences from another method.
 
 People differ far more than methods do: means of four to ten of them that differ by less than the spread may yet differ
 for sure, and the paired differences tell. A cell holds only people who have that measure.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass
@@ -22,8 +19,7 @@ Scores = dict[str, dict[str, dict[str, float | None]]]
 
 @dataclass(frozen=True)
 class Column:
-    """A measure: its heading with the unit, decimals, and which way is better: more (+1), less (-1), or neither (0), as
-    of what is best near a value."""
+    """A measure: heading with the unit, decimals, and the better direction: more (1), less (-1), neither (0)."""
 
     label: str
     digits: int = 2
@@ -32,8 +28,10 @@ class Column:
 
 @dataclass(frozen=True)
 class Cell:
-    """mean and spread (standard deviation, None for one) over the people; difference and error: mean of the paired
-    differences from the compared method and its standard error (None for fewer than two people); people: how many."""
+    """Mean and spread over people, paired difference from the compared method and its standard error, and count.
+
+    spread is None for one person, difference and error for fewer than two.
+    """
 
     mean: float
     spread: float | None
@@ -43,20 +41,20 @@ class Cell:
 
 
 def summarise(scores: Scores, columns: dict[str, Column], against: str | None = None) -> dict[str, dict[str, Cell]]:
-    """Method -> measure -> Cell. `against`: the method that differences are taken from; its own are None."""
+    """Return method -> measure -> Cell; differences are taken from the method `against`."""
     found: dict[str, dict[str, Cell]] = {}
     for method, people in scores.items():
         other = scores.get(against, {}) if against not in (None, method) else {}
         for measure in columns:
-            known = {person: value for person, row in people.items() if _is_known(value := row.get(measure))}
-            if not known:
+            values_by_person = {person: value for person, row in people.items() if _is_known(value := row.get(measure))}
+            if not values_by_person:
                 continue
             pairs = [
                 value - theirs
-                for person, value in known.items()
+                for person, value in values_by_person.items()
                 if _is_known(theirs := other.get(person, {}).get(measure))
             ]
-            values = list(known.values())
+            values = list(values_by_person.values())
             found.setdefault(method, {})[measure] = Cell(
                 float(np.mean(values)),
                 _deviation(values),
@@ -68,7 +66,7 @@ def summarise(scores: Scores, columns: dict[str, Column], against: str | None = 
 
 
 def standard_error(differences: list[float]) -> float | None:
-    """Of the mean of paired differences: their deviation (n - 1) over the square root of n; None for fewer than two."""
+    """Return the standard error of the mean of paired differences; None for fewer than two."""
     deviation = _deviation(differences)
     return None if deviation is None else deviation / math.sqrt(len(differences))
 
@@ -76,10 +74,10 @@ def standard_error(differences: list[float]) -> float | None:
 def format_table(
     summary: dict[str, dict[str, Cell]], columns: dict[str, Column], title: str, against: str | None = None
 ) -> str:
-    """Return a line per method: mean +- spread over people; with `against`, a second table of the paired differences +-
-    their standard errors. A column that nobody has is left out.
+    """Return Markdown: a line per method, mean ± spread; with `against`, a second table of paired differences.
 
-    against: the method that `summary` has differences from. Returns Markdown."""
+    A column that nobody has is left out.
+    """
     shown = {name: column for name, column in columns.items() if any(name in row for row in summary.values())}
     tables = [
         markdown(
@@ -103,7 +101,7 @@ def format_table(
 
 
 def to_record(summary: dict[str, dict[str, Cell]], scores: Scores) -> dict:
-    """Return what figures.write_record takes: per method the cells, and every person's figures behind them."""
+    """Return the input of figures.write_record: per method the cells, and every person's figures."""
     return {
         "summary": {
             method: {
@@ -130,8 +128,7 @@ def _mean_text(cell: Cell | None, column: Column) -> str | None:
 
 
 def _difference_text(cell: Cell | None, column: Column) -> str | None:
-    """In bold where it is better than the compared method by more than two standard errors, in italics where it is
-    worse by as much."""
+    """Return a cell, bold if better by more than two standard errors, italic if worse by as much."""
     if cell is None or cell.difference is None:
         return None
     error = "" if cell.error is None else f" ± {cell.error:.{column.digits}f}"
@@ -143,6 +140,17 @@ def _difference_text(cell: Cell | None, column: Column) -> str | None:
 
 def _deviation(scores: list[float]) -> float | None:
     return float(np.std(scores, ddof=1)) if len(scores) > 1 else None
+
+
+def mean(values: list[float | None]) -> float | None:
+    """Return the mean of the finite values, None if there are none."""
+    finite = [value for value in values if _is_known(value)]
+    return float(np.mean(finite)) if finite else None
+
+
+def mean_of(rows: list[dict[str, float | None]]) -> dict[str, float | None]:
+    """Return the mean of each figure over the rows that have it, None if none has."""
+    return {name: mean([row.get(name) for row in rows]) for name in dict.fromkeys(name for row in rows for name in row)}
 
 
 def _is_known(figure: float | None) -> bool:

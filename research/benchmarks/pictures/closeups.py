@@ -1,17 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Close-ups of the six people of research/benchmarks/captures/people.py by the add-on's own buttons: what
-hair_closeups.py and eyes_closeups.py share.
+"""Close-ups of the six people of research/benchmarks/captures/people.py by the add-on's own buttons.
 
 Maps and heads are the true ones, so the pictures show what hair, eyes and mouth do and nothing of a solve's errors.
 Cycles's linear light under the sRGB curve (Blender's view transform Standard).
 """
 
-from __future__ import annotations
-
-import argparse
 import importlib
-import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -19,18 +14,21 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[3]
+from ..figures import command_line, run_python
+
 LIGHTS = ("three_point", "overcast", "sun")
 SEAMS = {"mouth": 0, "eye": 1}
-"""Where the camera looks: the middle of what the face units cut open there (the eye on the person's left)."""
+"""Points that the camera looks at: the middle of the seam of mouth or eye (the eye on the person's left)."""
 EEVEE_SAMPLES = 32
 
 
 @dataclass(frozen=True)
 class CloseUp:
-    """What a picture shows: opened: how far the eyes are open; units: face units and their values; at: one of SEAMS,
-    `above_m` metres above it, seen from `away_m` metres away on the side `way` [3] in the head's axes through a lens of
-    `lens_mm`."""
+    """Content of a picture.
+
+    opened: how far the eyes are open; units: face units and their values; at: one of SEAMS, `above_m` metres above it,
+    seen from `away_m` metres away on the side `way` [3] in the head's axes through a lens of `lens_mm`.
+    """
 
     light: str
     at: str
@@ -49,52 +47,34 @@ class CloseUp:
 Shots = Callable[[str], dict[str, CloseUp]]
 
 
-def run_closeups(module: str, description: str, shots: Shots, resolution: int, samples: int) -> None:
-    """The command that a module of close-ups is: a row of pictures for each person.
+def run_closeups(module: str, description: str, shots: Shots) -> None:
+    """Run the command of a module of close-ups: a row of pictures for each person.
 
-    shots: name of a person -> name of a picture -> what it shows; resolution: pixels of a side, where the command
-    does not say."""
-    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    shots: name of a person -> name of a picture -> its content.
+    """
+    parser = command_line(description)
     parser.add_argument("folder", type=Path, help="keeps captures and renders; finished renders are taken as they are")
     parser.add_argument("out", type=Path)
     parser.add_argument("--only", nargs="+", metavar="NAME", help="of the six people")
-    parser.add_argument("--resolution", type=int, default=resolution, help="pixels of a picture's side")
-    parser.add_argument("--samples", type=int, default=samples)
     options = parser.parse_args()
     from core.imaging import images
 
     from ..captures.people import PEOPLE
     from .sheet import write_small
 
-    captures = [
-        prepare(options.folder, person.name, person.seed)
-        for person in PEOPLE
-        if person.name in (options.only or [person.name])
-    ]
     rows = []
-    # each in a process of its own: what EEVEE has compiled for one head, it does not give back
-    for capture in captures:
-        words = [f"{__package__}.{module}", str(capture), str(options.resolution), str(options.samples)]
-        subprocess.run(
-            [
-                sys.executable,
-                "-m",
-                "research.benchmarks.pictures.closeups",
-                f"research.benchmarks.pictures.{module}",
-                *words,
-            ],
-            cwd=ROOT,
-            check=True,
-        )
-        rows.append(
-            np.concatenate([images.read_srgb(capture / "renders" / f"{name}.png") for name in shots(capture.stem)], 1)
-        )
-    write_small(options.out, np.concatenate(rows))
+    for person in (person for person in PEOPLE if person.name in (options.only or [person.name])):
+        capture = prepare(options.folder, person.name, person.seed)
+        # in a process of its own: EEVEE does not give back what it has compiled for a head
+        if code := run_python(f"{__package__}.closeups", f"{__package__}.{module}", capture):
+            raise SystemExit(code)
+        paths = [capture / "renders" / f"{name}.png" for name in shots(capture.stem)]
+        rows.append(np.hstack([images.read_srgb(path) for path in paths]))
+    write_small(options.out, np.vstack(rows))
 
 
 def prepare(folder: Path, name: str, seed: int) -> Path:
-    """Return a capture with the true head and maps, and what the stage 4K Maps finds of its hair, made if it is not
-    there."""
+    """Return a capture with the true head and maps, and with its hair found by the stage 4K Maps; made once."""
     from core.capture.capture import Capture
     from core.capture.messages import Reporter
     from core.face import template
@@ -106,7 +86,7 @@ def prepare(folder: Path, name: str, seed: int) -> Path:
     from ...people.identities import subject_mesh
     from ...people.parameters import sample_parameters
     from ...people.skin import make_skin
-    from ..captures.people import write_maps
+    from ..captures.truth_files import write_maps
 
     capture = Capture(folder / f"{name}.wildcap")
     if not (capture.maps_4k / "strands.npz").is_file():
@@ -190,9 +170,9 @@ def aim(camera, obj, shot: CloseUp) -> None:
 
 
 def main() -> None:
-    """One capture's renders: MODULE CAPTURE RESOLUTION SAMPLES."""
-    module, root, resolution, samples = sys.argv[1:]
-    render_closeups(Path(root), importlib.import_module(module).shots(Path(root).stem), int(resolution), int(samples))
+    """Render one capture's close-ups: MODULE CAPTURE."""
+    module, root = importlib.import_module(sys.argv[1]), Path(sys.argv[2])
+    render_closeups(root, module.shots(root.stem), module.RESOLUTION, module.SAMPLES)
 
 
 if __name__ == "__main__":

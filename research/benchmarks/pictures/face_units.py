@@ -1,22 +1,20 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guide's picture of face units, by the add-on's own buttons: at rest as solved, eyes open, jawOpen with
-browInnerUp, a wink and a smile; with the eyes and the mouth of Close-Up Eyes.
+"""Draw the guide's picture of face units: at rest, eyes open, jawOpen with browInnerUp, a wink and a smile.
 
-    python -m research.benchmarks.pictures.face_units .demo/sample.wildcap docs/pictures/face_units.jpg
+python -m research.benchmarks.pictures.face_units .demo/sample.wildcap docs/pictures/face_units.jpg
 """
 
-from __future__ import annotations
-
-import argparse
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
+from ..figures import command_line
 from .closeups import CloseUp, shoot_closeup
 from .render_capture import extension
 
+RESOLUTION, SAMPLES = 320, 32
 FACE = {
     "light": "overcast",
     "at": "mouth",
@@ -35,11 +33,9 @@ SHOTS = {
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("capture", type=Path, help="solved, its eyes filmed closed, as `make demo` leaves it")
     parser.add_argument("out", type=Path)
-    parser.add_argument("--resolution", type=int, default=320, help="pixels of a picture's side")
-    parser.add_argument("--samples", type=int, default=32)
     options = parser.parse_args()
     from core.imaging import images
 
@@ -51,7 +47,7 @@ def main() -> None:
         bpy.ops.wildcap.add_face_units()
         bpy.ops.wildcap.close_up()
         for name, shot in SHOTS.items():
-            shoot_closeup(head, shot, options.resolution, options.samples, Path(work) / f"{name}.png")
+            shoot_closeup(head, shot, RESOLUTION, SAMPLES, Path(work) / f"{name}.png")
         row = np.hstack([images.read_srgb(Path(work) / f"{name}.png")[..., :3] for name in SHOTS])
     images.write_srgb(options.out, row, quality=88)
 

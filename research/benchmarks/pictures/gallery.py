@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One subject's row of the gallery in docs/results/gallery.md, by one command; two lines of seven pictures:
+"""Draw one subject's picture of the gallery, two lines of seven.
 
     python -m research.benchmarks.pictures.gallery FOLDER/NAME.wildcap docs/pictures/gallery_NAME.jpg [--truth
         FOLDER/NAME/maps]
@@ -12,12 +12,6 @@ Blender's view transform Standard, no look, exposure as the presets have it. Ren
 taken as they are.
 """
 
-from __future__ import annotations
-
-import argparse
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -28,9 +22,9 @@ from core.geometry import meshes, raster
 from core.geometry.views import View, read_views
 from core.imaging import images
 
-from .sheet import in_rows, write_small
+from ..figures import command_line, run_python
+from .sheet import in_rows, texture_and_mask, write_small
 
-ROOT = Path(__file__).resolve().parents[3]
 LIGHTS = ("three_point", "window", "sun", "city.exr")
 TILE, RESOLUTION, SAMPLES = 224, 320, 24  # pixels, pixels, rays per pixel
 # MediaPipe's landmark beside the nose, on the person's right; side of the close-up as a share of the map
@@ -38,34 +32,31 @@ CHEEK, CLOSE_UP = 203, 0.11
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("capture", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--truth", type=Path)
-    arguments = parser.parse_args()
-    capture = Capture(arguments.capture.resolve())
-    write_small(arguments.out, sheet(captured(capture) + solved(capture, arguments.truth) + relit(capture)))
+    options = parser.parse_args()
+    capture = Capture(options.capture.resolve())
+    write_small(options.out, sheet(captured(capture) + solved(capture, options.truth) + relit(capture)))
 
 
 def captured(capture: Capture) -> list[np.ndarray]:
-    """Frame and delit frame about the face, texture, and mask over the texture: sRGB, square."""
-    views = read_views(capture, selected_only=True)
+    """Return frame and delit frame about the face, texture, and mask over the texture: sRGB, square."""
     head = meshes.read_obj(capture.head)
-    # from the front
-    view = max((v for v in views if (capture.delit / f"{Path(v.name).stem}.png").is_file()), key=lambda v: v.axis[1])
+    delit = {
+        view.name: capture.delit / f"{Path(view.name).stem}.png" for view in read_views(capture, selected_only=True)
+    }
+    views = [view for view in read_views(capture, selected_only=True) if delit[view.name].is_file()]
+    view = max(views, key=lambda view: view.axis[1])  # from the front
     box = face_square(view, head)
     # a delighter knows nothing of what is behind the head
     cover = (raster.render_view(raster.RayCaster(head), view)[0] >= 0)[..., None]
-    texture = images.read_srgb(capture.texture_png)
-    mask = images.read_mask(capture.shadow_mask if capture.shadow_mask.exists() else capture.shadow_mask_auto)
-    mask = images.resize(mask, texture.shape[1], texture.shape[0])[..., None]
-    delit = images.read_srgb(capture.delit / f"{Path(view.name).stem}.png") * cover
-    return [view.read()[box], delit[box], texture, texture * (1 - 0.6 * mask) + mask * np.float32([0.6, 0, 0])]
+    return [view.read()[box], (images.read_srgb(delit[view.name]) * cover)[box], *texture_and_mask(capture)]
 
 
 def solved(capture: Capture, truth: Path | None) -> list[np.ndarray]:
-    """Albedo, true albedo, specular, normal, shading and a close-up of the albedo at the delivered size: sRGB,
-    square."""
+    """Return albedo, true albedo, specular, normal, shading and a close-up of the albedo: sRGB, square."""
     maps = capture.maps_4k if (capture.maps_4k / "shading.exr").is_file() else capture.maps
     albedo = images.read_srgb(maps / "diffuse_albedo.png")
     true = images.read_srgb(truth / "diffuse_albedo.png") if truth else np.zeros((8, 8, 3), np.float32)
@@ -96,28 +87,14 @@ def relit(capture: Capture) -> list[np.ndarray]:
     stale = [
         light for light, path in zip(LIGHTS, paths, strict=True) if not path.is_file() or path.stat().st_mtime < made
     ]
-    if stale:
-        subprocess.run(
-            [
-                sys.executable,
-                "-m",
-                "research.benchmarks.pictures.render_capture",
-                str(capture.root),
-                *stale,
-                "--resolution",
-                str(RESOLUTION),
-                "--samples",
-                str(SAMPLES),
-            ],
-            cwd=ROOT,
-            check=True,
-            stdout=subprocess.DEVNULL,
-        )
+    size = ("--resolution", RESOLUTION, "--samples", SAMPLES)
+    if stale and run_python("research.benchmarks.pictures.render_capture", capture.root, *stale, *size, quiet=True):
+        raise SystemExit("The renders failed.")
     return [images.linear_to_srgb(images.read_linear(path)) for path in paths]
 
 
 def face_square(view: View, head: meshes.Mesh) -> tuple[slice, slice]:
-    """Rows and columns of the square about the face in a view, within the picture."""
+    """Return rows and columns of the square about the face in a view, within the picture."""
     pixels, _ = view.project(template.landmark_points(head))
     middle, side = (pixels.min(0) + pixels.max(0)) / 2, 1.35 * (pixels.max(0) - pixels.min(0)).max()
     side = int(min(side, view.width, view.height))
@@ -134,11 +111,10 @@ def landmark_uv(index: int) -> np.ndarray:
 
 
 def sheet(pictures: list[np.ndarray]) -> np.ndarray:
-    """Square pictures in two lines, each TILE wide."""
+    """Return square pictures in two lines, each TILE wide."""
     tiles = [np.clip(images.resize(np.asarray(picture, np.float32), TILE, TILE), 0, 1) for picture in pictures]
     return in_rows(tiles, (len(tiles) + 1) // 2)
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     main()

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A contact sheet of the people of research/benchmarks/captures/likenesses.py: front, three-quarter, an eye and its
-brow close to, and the bare skin below hair and clothes."""
-
-from __future__ import annotations
+"""A contact sheet of people: front, three-quarter, an eye and its brow, and the bare skin below hair and clothes."""
 
 import time
 from pathlib import Path
@@ -29,8 +26,7 @@ SHOTS = (  # azimuth, height in degrees, distance and the point looked at in met
 
 
 def write_sheet(out: Path, seeds: list[int], work: Path, facekit: Path | None = None) -> None:
-    """Draw a row for each person; renders in the folder `work` are not made again, heads come from ICT-FaceKit if
-    given."""
+    """Draw a row for each person; renders in the folder `work` are not made again."""
     rows = []
     for seed in seeds:
         began = time.monotonic()

@@ -3,16 +3,11 @@
 """Render a solved capture with Cycles through the installed extension's own functions, in a process of its own.
 
     python -m research.benchmarks.pictures.render_capture CAPTURE [LIGHT ...] [--resolution PX] [--samples N]
-    python -m research.benchmarks.pictures.render_capture CAPTURE --contact-sheet
 
 Each light (default: all presets; the name of one of Blender's worlds means that) gives renders/LIGHT.png, shown without
-a look, and the linear renders/LIGHT.exr; --contact-sheet joins all presets to renders/contact_sheet.png. (With Blender
-itself: blender --command wildcap ...)
+a look, and the linear renders/LIGHT.exr. (With Blender itself: blender --command wildcap ...)
 """
 
-from __future__ import annotations
-
-import argparse
 import contextlib
 import os
 import tempfile
@@ -20,26 +15,22 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ...people.blender_module import without_numpy_1
+from ..figures import ROOT, command_line
 
-ROOT = Path(__file__).resolve().parents[3]
 EXTENSION = "bl_ext.user_default.wildcap"
-"""The checkout's name in Blender, the very one that users get."""
+"""Checkout's name in Blender, the very one that users get."""
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("capture", type=Path)
     parser.add_argument("lights", nargs="*", metavar="LIGHT")
     parser.add_argument("--resolution", type=int, default=640)
     parser.add_argument("--samples", type=int, default=32)
-    parser.add_argument("--contact-sheet", action="store_true")
     options = parser.parse_args()
     with extension():
         from bl_ext.user_default.wildcap.wildcap_addon.relight import headless
 
-        if options.contact_sheet:
-            print(headless.render_contact_sheet(options.capture, options.resolution, options.samples), flush=True)
-            return
         for path in headless.render_relit(
             options.capture, options.lights or headless.ALL, options.resolution, options.samples
         ):

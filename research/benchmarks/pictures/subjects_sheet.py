@@ -1,14 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guide's picture of many faces: the eight synthetic subjects that no training sees, each filmed in a room of its
-own.
+"""Draw the guide's picture of many faces: the eight reserved synthetic subjects, each in a room of its own.
 
-    python -m research.benchmarks.pictures.subjects_sheet docs/pictures/subjects.jpg
+python -m research.benchmarks.pictures.subjects_sheet docs/pictures/subjects.jpg
 """
 
-from __future__ import annotations
-
-import argparse
 import tempfile
 from pathlib import Path
 
@@ -20,6 +16,7 @@ from ...people import scene
 from ...people.parameters import sample_parameters
 from ...people.sample import render_frames
 from ...people.skin import make_skin
+from ..figures import command_line
 from .sheet import in_rows, write_small
 from .video_examples import around
 
@@ -30,7 +27,7 @@ MAPS, SAMPLES = 1024, 24
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("out", type=Path)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as work:

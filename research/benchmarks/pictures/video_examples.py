@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a video should and should not look like, for the guide, made with the synthetic subject.
+"""Draw the guide's pictures of good and bad videos, made with the synthetic subject.
 
     python -m research.benchmarks.pictures.video_examples docs/pictures
 
@@ -8,9 +8,6 @@ docs/pictures/film_good.jpg: five frames of one arc from ear to ear. docs/pictur
 too far, too near, a bare background, burnt out, too dark.
 """
 
-from __future__ import annotations
-
-import argparse
 import tempfile
 from pathlib import Path
 
@@ -22,6 +19,7 @@ from ...people import scene
 from ...people.parameters import sample_parameters
 from ...people.sample import MAPS, RESERVED, render_frames
 from ...people.skin import make_skin
+from ..figures import command_line
 
 SCALE, SAMPLES = 0.4, 24
 SWING_DEG, BLUR = 4.0, 9
@@ -29,7 +27,7 @@ SWING_DEG, BLUR = 4.0, 9
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("folder", type=Path)
     folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
@@ -65,8 +63,7 @@ def main() -> None:
 
 
 def around(azimuth_deg: float, height_deg: float, distance: float = scene.DISTANCE) -> np.ndarray:
-    """Camera-to-world matrix [4, 4] on a sphere around the head's middle, upright; azimuth 0 is before the face,
-    positive to its left."""
+    """Return a camera-to-world matrix [4, 4] around the head, upright; azimuth 0 is in front, positive to its left."""
     azimuth, height = np.radians(azimuth_deg), np.radians(height_deg)
     back = np.array([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)])
     right = np.cross([0, 0, 1.0], back)

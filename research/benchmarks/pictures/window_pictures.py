@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guide's pictures of the window, out of the screenshots that the window flows leave in dist/gui.
+"""Cut the guide's pictures of the window out of the screenshots that the window flows leave in dist/gui.
 
     make demo zip
     tests/gui/run.sh loop panels set_up
@@ -10,9 +10,6 @@ They show the sample head and nothing else; of set_up, which installs the solver
 picture whose screenshots are not there is named, and the old one stays.
 """
 
-from __future__ import annotations
-
-import argparse
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +18,7 @@ import numpy as np
 
 from core.imaging import images
 
-from ..figures import ROOT
+from ..figures import ROOT, command_line
 
 SHOTS, TARGET = ROOT / "dist" / "gui", ROOT / "docs" / "pictures"
 QUALITY = 88
@@ -29,8 +26,10 @@ QUALITY = 88
 
 @dataclass(frozen=True)
 class WindowPicture:
-    """shots: side by side, names in dist/gui; boxes: left, top, right and bottom of what is shown of each, as shares of
-    a shot, or one for all; width_px: of each shot, at most."""
+    """Shots of dist/gui side by side.
+
+    boxes: left, top, right and bottom of each as shares of a shot, or one for all; width_px: of each shot, at most.
+    """
 
     shots: tuple[str, ...]
     width_px: int
@@ -38,9 +37,9 @@ class WindowPicture:
 
 
 QUESTION, PANEL = (0.005, 0.38, 0.397, 0.66), (0.605, 0.1, 0.825, 0.38)
-"""The dialog over the 3D view, and the tab with its neighbours' names."""
+"""Dialog over the 3D view, and the tab with its neighbours' names."""
 HEAD = (0.285, 0.13, 0.54, 0.8)
-"""The head in the 3D view, between its tools and the sidebar."""
+"""Head in the 3D view, between its tools and the sidebar."""
 PICTURES = {
     "paint_on_head": WindowPicture(("4_stroke_on_head",), 1280),
     "paint_on_sheet": WindowPicture(("5_stroke_on_sheet",), 1280),
@@ -56,7 +55,7 @@ PICTURES = {
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--only", nargs="+", choices=PICTURES, default=list(PICTURES))
     missing = 0
     for name in parser.parse_args().only:

@@ -1,17 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/results/confidence.md: how far the confidence map knows the error."""
+"""docs/results/confidence.md: how far the confidence map predicts the error."""
 
-from __future__ import annotations
-
-from ..figures import Figures
-from ..maps import confidence
-from ..pages import Sections
+from ..maps.confidence import sections as sections
 
 TITLE = "Confidence"
-SAYS = "How far the map that says where the albedo may be wrong is right."
+SAYS = "How well the confidence map predicts where the albedo is wrong."
 RECORDS = ("confidence",)
-
-
-def sections(record: Figures) -> Sections:
-    return confidence.sections(record)

@@ -2,53 +2,42 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/results/controlled.md: the gap to a controlled capture, and studio input."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..figures import Figures
 from ..light.controlled import table
-from ..pages import Sections, prose
+from ..pages import prose
 from .comparison import by_person
 
 TITLE = "The gap to a controlled capture, and studio input"
-SAYS = "The same people under a flash in a dark room, and before sixteen fixed cameras in even light."
+SAYS = "The same people under a flash in a dark room, and in front of sixteen fixed cameras in even light."
 RECORDS = ("controlled",)
 
 
-def sections(controlled: Figures) -> Sections:
-    mean = controlled.mean
-    adds = {
-        name: rows.studio.psnr_after_gain - rows.studio_texture.psnr_after_gain
-        for name, rows in controlled.people.items()
-    }
+def sections(controlled: Figures) -> str:
+    mean, people = controlled.mean, controlled.people
+    adds = {name: rows.studio.psnr_after_gain - rows.studio_texture.psnr_after_gain for name, rows in people.items()}
     added = list(adds.values())
-    return [
-        (
-            "",
-            prose(
-                """
+    return prose(
+        """
         The six people of the [gallery](gallery.md), in a dark room with a lamp at the camera (the paper's comparison
-        with DoRA), and before sixteen fixed cameras in even light. The lamp's light is known and is divided out of the
-        frames, its highlight found by how each place brightens as the lamp moves with the camera
-        (`research/benchmarks/light/flash_light.py`); the solve then holds an even light. *True frames* is the true
-        albedo as a texture: what is lost there, geometry and texture lose. All maps are scored in the same frames,
-        those of the capture in the wild; moles: 1 is all of their contrast. In the studio no delighter runs and the
-        mask is empty.
+        with DoRA), and in front of sixteen fixed cameras in even light. The lamp's light is known and divided out of
+        the frames; its highlight is found from how each place brightens as the lamp moves with the camera
+        (`research/benchmarks/light/flash_light.py`). The solve then holds an even light. *True frames* is the true
+        albedo as a texture: its loss is that of geometry and texture. All maps are scored in the frames of the capture
+        in the wild. Moles: 1 is all of their contrast. In the studio no delighter runs and the mask is empty.
         """,
-                table(controlled),
-                f"""
+        table(controlled),
+        f"""
         The gap to a flash in a dark room is {mean.flash.psnr_after_gain - mean.wild.psnr_after_gain:.1f} dB (the paper
-        reports comparable quality, without figures). The wild captures lose low-frequency light that no stage told from
-        skin, and moles: the delighter's frames hold {mean.wild_texture.mole_contrast:.2f} of their contrast, the
-        flash's {mean.flash_texture.mole_contrast:.2f}. Light that bounces between lids, nose and lips is not part of
-        the known light and stays in the flash's maps.
+        reports comparable quality, without figures). The captures in the wild lose low-frequency light that no stage
+        separated from skin, and moles: the delighter's frames keep {mean.wild_texture.mole_contrast:.2f} of their
+        contrast, the flash's {mean.flash_texture.mole_contrast:.2f}. Light that bounces between lids, nose and lips is
+        not part of the known light and stays in the flash's maps.
 
         **In the studio the solve adds {np.mean(added):+.2f} ± {np.std(added, ddof=1) / len(added) ** 0.5:.2f} dB after
         one gain** ({by_person(adds)}), {mean.studio.psnr - mean.studio_texture.psnr:+.2f} dB without it: such frames
-        need no solve. The rows *in the wild, solved* are the maps of [the state of the albedo](state.md), by the solver
-        of that page.
+        need no solve. The rows *in the wild, solved* are the maps of [the state of the albedo](state.md), by the same
+        solver.
         """,
-            ),
-        )
-    ]
+    )
