@@ -56,16 +56,6 @@ def solve_and_quit():
     yield 600.0
 
 
-def solve():
-    """The solver runs; it then waits to be killed."""
-    root = yield from solving()
-    yield from d.until(
-        lambda: (root / "checkpoints" / "solve.safetensors").is_file(), "the first checkpoint", addon.START_LIMIT_S
-    )
-    tell("checkpoint", worker=addon.worker_process(root).pid)
-    yield 600.0
-
-
 def refused_and_paint():
     """A solve of what the first Blender solves, and strokes on the mask that is painted there, each told of when it is
     in the capture."""

@@ -24,13 +24,13 @@ CHEEK = Vector((0.3, -1.0, -0.1))
 """Where the person's left cheek is, right on the screen, seen from the middle of the head."""
 SHADOW, RADIUS = 0.4, 0.045
 """What is left of the light in a shadow cast on that cheek, and its radius in UV: the brush is wider."""
+LIMIT_S = 1700
 SHADE = """
 import sys
 import numpy as np
 from pathlib import Path
 from core.imaging import images
 
-LIMIT_S = 1700
 root, u, v, radius, left = Path(sys.argv[1]), *map(float, sys.argv[2:])
 texture = images.read_linear(root / "texture.exr")
 rows, columns = np.mgrid[:len(texture), :len(texture)] + 0.5
