@@ -181,26 +181,6 @@ def test_an_interrupted_solve_is_offered_to_go_on_when_the_file_is_opened_again(
     assert step(addon).label == "Solve"
 
 
-def test_an_installation_is_polled_like_a_job_and_sets_the_python(addon):
-    jobs, preferences = addon("jobs"), addon("preferences")
-
-    class Installation:
-        """Says what a real one says, without a download."""
-
-        running = True
-        start = staticmethod(lambda: None)
-        messages = [jobs.messages.Progress("environment", 1, 2, "Collecting torch"), jobs.messages.Done(1.0)]
-
-        def poll(self):
-            self.running = len(self.messages) > 1
-            return [self.messages.pop(0)]
-
-    jobs.start_worker("", "install", Installation(), lambda: preferences.set_python(Path(sys.executable)))
-    assert jobs.poll() and jobs.of("").progress.text == "Collecting torch"
-    assert not jobs.poll() and preferences.python() == Path(sys.executable)
-    preferences.set_python(None)
-
-
 def test_a_timer_that_fails_tells_it_and_goes_on(addon, monkeypatch):
     jobs, problems, incoming = addon("jobs"), addon("problems"), addon("incoming")
     with monkeypatch.context() as patched:

@@ -66,13 +66,8 @@ def enter(mode: str) -> None:
         bpy.ops.object.mode_set(mode=mode)
 
 
-@pytest.mark.parametrize("mode", ['OBJECT', 'EDIT'])
-def test_in_an_empty_scene_each_operator_works_or_says_why_not(operators, capfd, mode):
-    def set_up():
-        bpy.ops.wm.read_homefile(use_empty=True)
-        enter(mode)
-
-    said = call_all(operators, capfd, set_up)
+def test_in_an_empty_scene_each_operator_works_or_says_why_not(operators, capfd):
+    said = call_all(operators, capfd, lambda: bpy.ops.wm.read_homefile(use_empty=True))
     assert said["open_sample_head"] == "", said
     assert all(said[name] for name in ("solve", "reconstruct", "paint_mask", "render", "close_capture", "cancel"))
 

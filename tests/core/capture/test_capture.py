@@ -14,7 +14,7 @@ from core.capture.messages import Failed, Problem
 from core.worker.job import write_job
 from core.worker.runner import run_job
 from tests.fixtures.kept_capture import contents, make_frames
-from tests.fixtures.recorded import make, states
+from tests.fixtures.recorded import make
 
 
 @pytest.fixture
@@ -73,18 +73,6 @@ def test_a_file_in_the_way_of_the_folder_is_a_problem(tmp_path):
 
 
 # -- its record
-
-
-def test_a_missing_output_is_to_do_and_a_forgotten_stage_too(capture):
-    (capture.cameras / "a.bin").unlink()
-    capture.forget(["frames"])
-    assert states(capture) == ["to do", "to do"]
-
-
-def test_records_keep_what_was_used(capture):
-    record = capture.read()["stages"]["cameras"]
-    assert record["settings"]["interpupillary_mm"] == 63.0 and record["figures"] == {"count": 3}
-    assert record["seconds"] == 1.5 and record["version"] == "0.2.0"
 
 
 @pytest.mark.parametrize(("number", "words"), [(FORMAT + 1, "newer version"), (FORMAT - 1, "pre-release")])

@@ -63,15 +63,6 @@ def test_frames_have_names_without_a_path(tmp_path, name):
     refused(lambda: read_frames(capture), "frames.json", "no name of a frame")
 
 
-def test_names_in_every_script_are_names(tmp_path):
-    capture = Capture(tmp_path)
-    capture.frames.mkdir()
-    for name in ("Zoë – 1 (2).jpg", "顔 写真.png", "a..b.jpg", "c.jpg"):
-        record = json.dumps({"frames": [{**FRAME, "name": name}]}, ensure_ascii=False)
-        capture.frames_json.write_text(record, encoding="utf-8")
-        assert read_frames(capture).records[0].name == name
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -101,11 +92,6 @@ def test_capture_records_of_every_wrong_kind(tmp_path, text, capsys):
     capture.json.write_text(text)
     refused(capture.read, "capture.json")
     assert main(["status", str(tmp_path)]) == 2 and "Traceback" not in capsys.readouterr().err
-
-
-def test_a_record_of_tomorrow_is_told_whatever_its_form(tmp_path):
-    (tmp_path / "capture.json").write_text('{"format": 9, "stages": {"solve": [1, 2]}}')
-    refused(Capture(tmp_path).read, "newer version")
 
 
 @pytest.mark.parametrize("text", WRONG, ids=count())

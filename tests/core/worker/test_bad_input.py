@@ -51,40 +51,14 @@ def video(path: Path, pictures) -> Path:
     return path
 
 
-def empty_folder(path: Path, face: Path) -> None:
-    path.mkdir()
-
-
-def text(path: Path, face: Path) -> None:
-    path.write_text("Dear diary, no face today.\n" * 100)
-
-
-def truncated(path: Path, face: Path) -> None:
-    path.write_bytes(face.read_bytes()[: face.stat().st_size // 3])  # the index of an MP4 is at its end
-
-
-def wall(path: Path, face: Path) -> None:
-    noise = np.random.default_rng(0).integers(0, 255, (15, 20, 3), np.uint8)
-    video(path, [np.kron(np.roll(noise, k, 1), np.ones((8, 8, 1), np.uint8)) for k in range(4)])
-
-
-def still(path: Path, face: Path) -> None:
-    video(path, [astronaut()[0:220, 100:340]] * 4)
-
-
-@pytest.mark.parametrize(
-    ("make", "word"),
-    [(empty_folder, "photograph"), (text, "source.mp4"), (truncated, "source.mp4"), (wall, "face"), (still, "same")],
-)
-def test_bad_input_is_refused_and_the_capture_takes_a_good_video_then(capture, face, tmp_path, make, word):
-    make(tmp_path / "source.mp4", face)
-    final = run_job(write_job(capture, source=tmp_path / "source.mp4", last="frames"))
-    assert isinstance(final, Failed) and word in final.problem
-    assert final.problem.endswith(".") and final.remedy.endswith(".")
+def test_bad_input_is_refused_and_the_capture_takes_a_good_video_then(capture, face, tmp_path):
+    bad = tmp_path / "source.mp4"
+    bad.write_bytes(face.read_bytes()[: face.stat().st_size // 3])  # the index of an MP4 is at its end
+    final = run_job(write_job(capture, source=bad, last="frames"))
+    assert isinstance(final, Failed) and "source.mp4" in final.problem
     assert not capture.frames.exists() and not capture.lock.exists() and not list(capture.root.glob(".*"))
-    if make is text:
-        assert isinstance(run_job(write_job(capture, source=face, last="frames")), Done) and capture.source == face
-        assert len(json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]) == 6
+    assert isinstance(run_job(write_job(capture, source=face, last="frames")), Done) and capture.source == face
+    assert len(json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]) == 6
 
 
 # -- disks
@@ -140,7 +114,7 @@ def test_a_full_disk_loses_nothing_and_a_read_only_one_is_told(face, tmp_path):
     assert "read-only" in read_only
 
 
-# -- kill -9 and cancel in real stages
+# -- cancel in a real stage
 
 
 @pytest.fixture(scope="module")
@@ -154,38 +128,16 @@ def root(tmp_path_factory) -> Path:
     return core.parent
 
 
-def start(root: Path, capture: Capture, **job) -> Worker:
-    worker = Worker(Path(sys.executable), root, write_job(capture, **job), capture.logs / "worker.log")
-    worker.start()
-    return worker
-
-
-def at_work(stage: str):
-    return lambda message: isinstance(message, Progress) and message.stage == stage and message.done > 0
-
-
-def test_kill_in_the_frames_stage_and_resume(root, capture, face):
-    worker = start(root, capture, source=face, last="frames")
-    follow(worker, until=at_work("frames"), timeout_s=60)
-    worker._process.kill()
-    assert isinstance(follow(worker)[-1], Failed)
-    assert not capture.frames.exists()
-    assert isinstance(run_job(write_job(capture, last="frames")), Done)
-    assert len(list(capture.frames.glob("*.jpg"))) == 6 and not list(capture.root.glob(".*"))
-
-
 @pytest.mark.skipif(not SAMPLE.is_file(), reason="the sample video is not in this checkout")
-def test_kill_and_cancel_in_the_cameras_stage_keep_the_frames(root, capture):
-    """COLMAP runs in a process of its own and hears of nothing for seconds: both must end it, and soon."""
+def test_a_cancel_in_the_cameras_stage_keeps_the_frames(root, capture):
+    """COLMAP runs in a process of its own and hears of nothing for seconds: it ends with the worker, and soon."""
     job = {"last": "cameras", "settings": {"frames": {"max_frames": 8, "long_side": 320}}}
     assert isinstance(run_job(write_job(capture, source=SAMPLE, **{**job, "last": "frames"})), Done)
     frames = {path.name: path.read_bytes() for path in capture.frames.iterdir()}
-    worker = start(root, capture, **job)
-    follow(worker, until=at_work("cameras"), timeout_s=120)
-    worker._process.kill()
-    assert isinstance(follow(worker)[-1], Failed)
-    worker = start(root, capture, **job)
-    assert finished(follow(worker, until=at_work("cameras"), timeout_s=120)) == {"frames": True}
+    worker = Worker(Path(sys.executable), root, write_job(capture, **job), capture.logs / "worker.log")
+    worker.start()
+    messages = follow(worker, lambda m: isinstance(m, Progress) and m.stage == "cameras" and m.done > 0, timeout_s=120)
+    assert finished(messages) == {"frames": True}
     began = time.monotonic()
     worker.cancel()
     assert follow(worker)[-1] == Cancelled("cameras") and time.monotonic() - began < 2

@@ -13,7 +13,7 @@ import pytest
 from core.capture import stages
 from core.capture.capture import Capture
 from core.capture.files import storage_problem
-from core.capture.messages import Done, Failed, Log, Problem
+from core.capture.messages import Done, Failed, Problem
 from core.capture.report import findings
 from core.worker import runner
 from core.worker.job import read_job, write_job
@@ -88,13 +88,6 @@ def test_a_write_that_fails_is_named_by_the_file_it_was_for(tmp_path, code, word
     problem = runner.explained(OSError(code, os.strerror(code), str(path)), "solve", tmp_path / "solve.log")
     assert words in problem.problem and str(tmp_path / "maps" / "normal.png") in problem.problem
     assert problem.problem == storage_problem(OSError(code, os.strerror(code)), path).problem
-
-
-def test_what_libraries_print_goes_to_the_log_and_not_into_the_protocol(capture, video):
-    messages = run_here(capture, {"frames": "print"}, source=video, last="frames")
-    assert isinstance(messages[-1], Done) and not any(isinstance(m, Log) for m in messages)
-    log = (capture.logs / "frames.log").read_text(encoding="utf-8")
-    assert "{raw bytes" in log
 
 
 def test_a_capture_that_is_worked_on_is_refused_and_its_job_stays(capture, video):

@@ -144,4 +144,5 @@ def test_only_protocol_lines_leave_by_stdout(root, capture, video):
     ) as process:
         lines = process.stdout.read().splitlines()
     assert [json.loads(line)["kind"] for line in lines][-2:] == ["StageDone", "Done"]
-    assert "a library talks" in (capture.logs / "frames.log").read_text(encoding="utf-8")
+    log = (capture.logs / "frames.log").read_text(encoding="utf-8")
+    assert "a library talks" in log and "{raw bytes" in log

@@ -19,6 +19,7 @@ from core.batch import record
 from core.capture import sample_head
 from core.settings.settings import from_json, preset
 from tests.fixtures import batch_faces
+from tests.fixtures.recorded import finish_stages
 
 LIMIT_S = 900
 
@@ -53,7 +54,7 @@ def plan(root: Path) -> Path:
         shutil.move(root.parent / f"{name}.part", root / f"{name}.wildcap")
         addon.unsolved(root / f"{name}.wildcap")
         capture = batch_faces.filmed(root, name)
-        batch_faces.finish_up_to_mask(capture, settings)
+        finish_stages(capture, settings)
         faces.append(record.BatchFace(name, capture.source, capture.root, "draft", QUICK))
     record.write_batch(record.Batch(root, tuple(faces), "artist"))
     return root

@@ -163,17 +163,6 @@ def test_hair_is_in_the_picture_and_goes_aside_with_its_head(hair, addon):
     assert not any(thing.hide_get() for thing in hair)
 
 
-@pytest.mark.parametrize("suffix", [".usdc", ".abc"])
-def test_hair_goes_out_and_comes_back_by_blenders_own_exporters(hair, tmp_path, suffix):
-    kind = "usd" if suffix == ".usdc" else "alembic"
-    options = {} if kind == "usd" else {"as_background_job": False}
-    getattr(bpy.ops.wm, f"{kind}_export")(filepath=str(tmp_path / f"hair{suffix}"), **options)
-    bpy.ops.wm.read_homefile(use_empty=True)
-    getattr(bpy.ops.wm, f"{kind}_import")(filepath=str(tmp_path / f"hair{suffix}"), **options)
-    back = [obj for obj in bpy.data.objects if obj.type in ('CURVES', 'CURVE')]
-    assert [len(obj.data.curves if obj.type == 'CURVES' else obj.data.splines) for obj in back] == [40, 40]
-
-
 @pytest.mark.parametrize(
     "harm, word",
     [

@@ -33,15 +33,6 @@ def test_the_mask_painted_on_the_left_cheek_is_saved_on_the_left_cheek(mask_imag
     assert (row, column) == (height - 1 - round(v * height), round(u * width))
 
 
-def test_the_last_ten_masks_are_kept(mask_image, capture, item, addon):
-    folder = addon("captures").folder(item)
-    image = mask_image.load(folder)
-    for value in (*np.linspace(0, 1, 12), 1):  # an unchanged mask is no new one
-        fill(image, value)
-        mask_image.store_mask(mask_image.mask_values(image), folder, 'SHADOW')
-    assert len(list((capture / "mask_history").iterdir())) == 10
-
-
 def test_strokes_reach_the_capture_while_the_artist_paints_on(session, mask_image, capture, head, monkeypatch):
     path, first = capture / "shadow_mask.png", standin.plain((77,))
     path.write_bytes(first)

@@ -95,11 +95,6 @@ def test_undo_of_what_came_after_an_estimate_leaves_the_estimate(item, estimate,
     assert bpy.data.objects["Cube"].location.x == 0 and kept(bpy.context.scene.wildcap.captures[0])
 
 
-def test_operators_that_change_the_scene_are_steps_of_undo(addon):
-    for name in ("solve", "solve_edited", "fit_landmarks"):
-        assert 'UNDO' in getattr(bpy.types, f"WILDCAP_OT_{name}").bl_options
-
-
 def test_the_panel_says_where_the_tone_comes_from(addon, item, estimate):
     words = addon("solve.panel").tone_words
     figures = {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_group": "tan"}
