@@ -120,21 +120,3 @@ def test_a_studios_own_colour_configuration(tmp_path):
     }
     assert seen["mask_space"] == "Studio Numbers" and seen["mask"] == 0.5 and seen["render"]
     assert "no sRGB by a known name" in printed and "no view without a look" in printed, "the artist is told"
-
-
-def test_text_files_of_other_programs_are_read_with_decimal_commas(tmp_path):
-    """COLMAP's, Metashape's and RealityScan's text in a process whose C library writes 1,5 for one and a half."""
-    environment = german(tmp_path)
-    if not environment:
-        pytest.skip("there is no localedef, or it lacks de_DE")
-    code = """
-import locale, sys
-locale.setlocale(locale.LC_ALL, "")
-assert locale.str(1.5) == "1,5"
-import pytest
-sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "tests/core/stages/cameras/test_camera_import.py::test_known_cameras_come_back_exactly"]))
-"""
-    result = subprocess.run(
-        [sys.executable, "-c", code], env={**os.environ, **environment}, cwd=ROOT, capture_output=True, text=True
-    )
-    assert result.returncode == 0 and "passed" in result.stdout, result.stdout[-3000:]
