@@ -23,13 +23,12 @@ from core.imaging import images
 from core.imaging.mask_import import import_mask
 from core.settings.settings import preset
 from tests.conftest import ROOT
-from tests.fixtures import tiny_chain
 
 
-def core(tiny, *words) -> subprocess.CompletedProcess:
+def core(code, *words) -> subprocess.CompletedProcess:
     """A command line in a process of its own, over tiny rooms."""
     return subprocess.run(
-        [sys.executable, "-B", "-m", "core", *map(str, words)], cwd=tiny, capture_output=True, text=True, timeout=120
+        [sys.executable, "-B", "-m", "core", *map(str, words)], cwd=code, capture_output=True, text=True, timeout=120
     )
 
 
@@ -44,11 +43,6 @@ def refused(capsys):
         return lines
 
     return run
-
-
-@pytest.fixture(scope="module")
-def tiny(tmp_path_factory) -> Path:
-    return tiny_chain.build(tmp_path_factory.mktemp("tiny"))
 
 
 @pytest.fixture
@@ -86,12 +80,12 @@ def test_stages_lists_the_chain(capsys):
     assert [line.split()[0] for line in lines] == list(stages.NAMES) and "maps/normal.png" in lines[7]
 
 
-def test_run_until_then_on_with_options_that_reach_the_stages(tiny, capture, film, tmp_path):
+def test_run_until_then_on_with_options_that_reach_the_stages(tiny_code, capture, film, tmp_path):
     place = tmp_path / "mine"
     place.mkdir()
     for name in ("config.json", "ckpt.pth"):
         (place / name).touch()
-    begun = core(tiny, "run", film, capture.root, "--until", "cameras", "--quality", "draft")
+    begun = core(tiny_code, "run", film, capture.root, "--until", "cameras", "--quality", "draft")
     assert begun.returncode == 0 and "Cameras      done in" in begun.stdout and "Scan" not in begun.stdout, begun.stderr
     assert "report.html" in begun.stdout.splitlines()[-1] and capture.report.is_file()
     words = [
@@ -100,14 +94,14 @@ def test_run_until_then_on_with_options_that_reach_the_stages(tiny, capture, fil
         "--prior",
         place,
     ]
-    ended = core(tiny, "run", "-", capture.root, *words)
+    ended = core(tiny_code, "run", "-", capture.root, *words)
     assert ended.returncode == 0 and "Frames       unchanged" in ended.stdout, ended.stderr
     assert "4K Maps      done in" in ended.stdout
     solve, delight = (capture.read()["stages"][name]["settings"] for name in ("solve", "delight"))
     assert read_portable(solve["prior"], capture.root) == place and solve["skin_tone"] == "0.6,0.5,0.4"
     assert solve["steps"] == preset("draft").solve.steps
     assert (delight["delighter"], delight["folder"]) == ("folder", "../mine"), "it travels with the capture"
-    status = core(tiny, "status", capture.root).stdout
+    status = core(tiny_code, "status", capture.root).stdout
     assert str(film) in status and status.count("done") == len(stages.STAGES)
 
 
@@ -119,10 +113,10 @@ def test_what_a_later_stage_cannot_use_is_refused_before_the_first_one_runs(capt
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no other process can press Ctrl-C there")
-def test_ctrl_c_cancels_cleanly(tiny, capture, film):
+def test_ctrl_c_cancels_cleanly(tiny_code, capture, film):
     (capture.root / "mood.json").write_text('{"scan": "slow"}')
     command = [sys.executable, "-B", "-m", "core", "run", str(film), str(capture.root)]
-    with subprocess.Popen(command, cwd=tiny, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(command, cwd=tiny_code, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         while not list(capture.root.glob(".scan*")):
             assert process.poll() is None
             time.sleep(0.02)

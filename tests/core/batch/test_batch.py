@@ -24,11 +24,6 @@ from tests.fixtures import tiny_batch
 from tests.fixtures.tiny_batch import core, finish, finished, lines, make, set_mood, states
 
 
-@pytest.fixture(scope="module")
-def code(tmp_path_factory):
-    return tiny_batch.build(tmp_path_factory.mktemp("tiny"))
-
-
 def test_a_batch_is_done_once(code, tmp_path):
     batch = make(tmp_path)
     assert states(batch) == dict.fromkeys("ab", TO_DO)

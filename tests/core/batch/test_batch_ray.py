@@ -35,11 +35,6 @@ WAIT_S = 90  # for what takes seconds where nothing else is computed
 
 
 @pytest.fixture(scope="module")
-def code(tmp_path_factory):
-    return tiny_batch.build(tmp_path_factory.mktemp("tiny"))
-
-
-@pytest.fixture(scope="module")
 def ray(code):
     """Ray, connected to a cluster of this machine; what it is told by the environment ends with these tests."""
     with pytest.MonkeyPatch.context() as environment:

@@ -22,7 +22,6 @@ from core.batch.lines import PARTS
 from core.batch.record import read_batch
 from core.capture.capture import Capture
 from tests.conftest import ROOT
-from tests.fixtures import tiny_batch
 from tests.fixtures.tiny_batch import core, set_mood
 
 SCRIPT = (ROOT / "farm" / "flamenco" / "wildcap.js").read_text(encoding="utf-8")
@@ -134,9 +133,9 @@ def sent(argument: str, values: dict[str, str]) -> str:
     return argument
 
 
-def test_the_commands_do_the_work_on_a_machine_that_sees_the_storage_elsewhere(tmp_path):
+def test_the_commands_do_the_work_on_a_machine_that_sees_the_storage_elsewhere(code, tmp_path):
     """Two faces, one of which stops and fails its own job alone, up to its mask and from there to the end."""
-    code, storage, seen = tiny_batch.build(tmp_path / "pro gram"), tmp_path / "st örage", tmp_path / "vol"
+    storage, seen = tmp_path / "st örage", tmp_path / "vol"
     (storage / "films").mkdir(parents=True)
     for name in ("Zoë d'Arc", "Anna"):
         (storage / "films" / f"{name}.mp4").write_text(name, encoding="utf-8")

@@ -31,7 +31,7 @@ EYE = {"centre": [0.029, 0.003, -0.002], "radius": 0.0145, "gaze": [0.28, -0.96,
 
 
 @pytest.fixture
-def open_eyed(capture, addon):
+def open_eyed(capture, addon, few_units):
     """A capture that was filmed with open eyes, half as wide as MakeHuman opens them and looking to the left; its
     vertices at rest with open lids [N, 3], those that were filmed [M] and the solved head's [V, 3]."""
     solved = write_head(capture, 0.95)
