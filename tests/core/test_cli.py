@@ -149,13 +149,6 @@ def test_what_cannot_be_is_refused_in_two_lines(capture, refused, words):
     refused(*(capture.root if word == "CAPTURE" else word for word in words))
 
 
-def test_a_folder_of_other_things_and_a_capture_of_a_newer_version_are_refused(capture, film, tmp_path, refused):
-    assert "capture" in refused("run", film, tmp_path)[0]
-    capture.json.write_text('{"format": 99, "source": "", "stages": {}}')
-    for words in (("run", film, capture.root), ("status", capture.root)):
-        assert "newer version" in refused(*words)[0]
-
-
 def test_the_command_line_loads_nothing_heavy():
     code = (
         "import sys; import core.__main__; print(sorted({'numpy', 'torch', 'cv2', 'OpenImageIO', 'pycolmap'} & "

@@ -48,16 +48,6 @@ def compiled(**settings) -> list[dict]:
     return dukpy.evaljs([STAND_INS, SCRIPT, "compileJob(job); made"], settings=known)
 
 
-def test_the_settings_are_what_flamenco_can_show():
-    label, settings = dukpy.evaljs([STAND_INS, SCRIPT, "[JOB_TYPE.label, JOB_TYPE.settings]"], settings={})
-    assert label and len({setting["key"] for setting in settings}) == len(settings)
-    for setting in settings:
-        assert setting["type"] == "string" and setting["description"]
-        assert set(setting) <= {"key", "type", "subtype", "required", "choices", "default", "description"}
-        assert setting.get("required", False) != ("default" in setting)
-    assert [setting["choices"] for setting in settings if "choices" in setting] == [list(PARTS)]
-
-
 def test_a_face_is_the_chain_of_the_batchs_tasks():
     assert not re.search(r"\bconst\b", SCRIPT), "the one word newer than ES5 that this engine takes"
     made = compiled(gpu_task_type="cuda", task_type="")

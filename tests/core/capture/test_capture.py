@@ -64,14 +64,6 @@ def test_a_source_inside_the_capture_is_refused(capture):
                 attempt(source)
 
 
-def test_a_file_in_the_way_of_the_folder_is_a_problem(tmp_path):
-    capture = Capture(tmp_path / "x.wildcap")
-    capture.root.write_text("a file")
-    for attempt in (capture.locked().__enter__, lambda: write_json(capture.job, {})):
-        with pytest.raises(Problem):
-            attempt()
-
-
 # -- its record
 
 

@@ -10,7 +10,6 @@ from core.__main__ import main
 from core.capture import deletion, ownership
 from core.capture.capture import Capture
 from core.capture.files import replacing
-from core.capture.messages import Problem
 from tests.fixtures import delivered, kept_capture
 from tests.fixtures.kept_capture import make_frames
 
@@ -97,9 +96,3 @@ def test_the_terminal_lists_first_and_deletes_when_told_to(capture, capsys):
     assert "Renders" in capsys.readouterr().out and capture.head.exists(), "only listed"
     assert main(["delete", str(capture.root), "--yes"]) == 0 and not capture.root.exists()
     assert main(["delete", str(capture.root)]) == 2 and "no capture" in capsys.readouterr().err
-
-
-def test_a_face_that_is_worked_on_is_refused(capture):
-    with capture.locked(), pytest.raises(Problem, match="work"):
-        deletion.delete(Capture(capture.root))
-    assert capture.head.exists()

@@ -91,9 +91,7 @@ def test_what_is_no_setting_is_refused(values, words):
     ("wrong", "right"),
     [
         ("slove", "solve"),
-        ("solve.step", "solve.steps"),
         ("skin_tone", "solve.skin_tone"),
-        ("sede", "seed"),
     ],
 )
 def test_the_nearest_setting_is_named(wrong, right):

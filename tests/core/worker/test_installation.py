@@ -6,7 +6,6 @@ network."""
 import shutil
 import sys
 import time
-import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -117,22 +116,6 @@ def test_the_life_of_an_environment(local, wheels, tmp_path, request):
     remove(folder)
     assert not folder.exists()
     remove(folder)
-
-
-def test_a_package_that_is_another_file_is_refused(local, wheels, copied, tmp_path):
-    with zipfile.ZipFile(wheels / "tinynets-1.0-py3-none-any.whl", "a") as wheel:
-        wheel.writestr("not_locked.py", "")
-    final = install(tmp_path / "env", local)
-    assert isinstance(final, Failed) and "hash" in final.problem
-    assert not list((tmp_path / "env").rglob("not_locked.py"))
-
-
-def test_what_cannot_be_loaded_is_told(local, wheels, copied, tmp_path):
-    (local / "worker.txt").write_text("broken==1.0\n")
-    write_lock(local, write_wheel(wheels, "broken", code="raise OSError('no such library')"))
-    final = install(tmp_path / "env", local)
-    assert isinstance(final, Failed) and final.problem == "broken does not load: OSError: no such library."
-    assert "install.log" in final.remedy
 
 
 def test_a_cancel_ends_an_installation_within_two_seconds(local, wheels, copied, tmp_path):

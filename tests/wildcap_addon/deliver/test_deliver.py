@@ -5,7 +5,6 @@ unit, UVs, maps and shape keys."""
 
 import json
 import os
-import re
 import struct
 import subprocess
 import sys
@@ -169,17 +168,6 @@ def test_usd_with_blend_shapes_colour_spaces_and_hair(hairy, deliver):
     ((name, (points, widths)),) = read["hairs"].items()
     assert "brows" in name and np.allclose(points, HAIRS.reshape(-1, 3), atol=1e-6)
     assert np.allclose(widths, 8e-5, rtol=1e-3)
-
-
-def test_fbx_for_arnold_refers_to_linear_exr_numbered_by_tile(deliver):
-    folder = deliver(preset="arnold")
-    names = {
-        name.decode().replace("\\", "/")
-        for name in re.findall(rb"textures[\\/]\w+\.\w+\.exr", (folder / "face.fbx").read_bytes())
-    }
-    linked = ("base_color", "normal_camera", "specular", "specular_roughness")
-    assert names == {f"textures/face_{name}.1001.exr" for name in linked}
-    assert all((folder / name).is_file() for name in names)
 
 
 def test_obj_for_character_creator(deliver):
