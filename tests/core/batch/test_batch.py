@@ -18,9 +18,10 @@ from core.batch.record import read_batch
 from core.batch.state import DONE, STOPPED, TO_DO, WAITING, derive_state
 from core.capture import hashes, lease
 from core.capture.files import write_json
-from core.capture.messages import Problem, Progress
+from core.capture.messages import Progress
 from core.capture.stages import NAMES
 from tests.fixtures import tiny_batch
+from tests.fixtures.refused import refuses
 from tests.fixtures.tiny_batch import core, finish, finished, lines, make, set_mood, states
 
 
@@ -101,8 +102,7 @@ def test_the_gate_waits_for_each_mask(code, tmp_path):
     capture.shadow_mask_auto.write_text("another proposal")
     assert not gate.is_accepted(capture) and states(batch)["a"] != DONE, "another proposal has to be looked at"
     capture.shadow_mask_auto.unlink()
-    with pytest.raises(Problem, match="no proposed shadow mask"):
-        gate.accept_mask(capture)
+    refuses("no proposed shadow mask", gate.accept_mask, capture)
 
 
 @pytest.mark.parametrize(

@@ -29,6 +29,7 @@ from core.capture import lease
 from core.capture.hashes import hash_file
 from core.capture.messages import Problem
 from tests.fixtures import tiny_batch
+from tests.fixtures.refused import refuses
 from tests.fixtures.tiny_batch import core, finish, finished, lines, make, set_mood, states
 
 WAIT_S = 90  # for what takes seconds where nothing else is computed
@@ -153,8 +154,7 @@ def test_the_gate_waits_and_a_cluster_that_cannot_work_is_refused(code, cluster,
     batch = make(tmp_path, "ab", None, "--gate", "artist")
     finish(batch.face("a"), "shadow_mask")
     finish(batch.face("b"), "texture")
-    with pytest.raises(Problem, match="No node of the cluster has 1000 cores and 5 GB"):
-        ray_cluster._examine_nodes(cluster, batch, 1000)
+    refuses("No node of the cluster has 1000 cores and 5 GB", ray_cluster._examine_nodes, cluster, batch, 1000)
     with monkeypatch.context() as elsewhere, pytest.raises(Problem, match=f"{tmp_path / 'none'}. Set WILDCAP_CODE"):
         elsewhere.setattr(ray_cluster, "ROOT", tmp_path / "none")
         ray_cluster._examine_nodes(cluster, batch, 1)
@@ -242,10 +242,12 @@ def test_an_address_that_cannot_be_reached_is_told_in_seconds(code, tmp_path, ca
             _, err = process.communicate(timeout=30)  # 15 s, and what it takes to import Ray on a busy machine
         assert process.returncode == 2 and "No Ray cluster can be reached" in err and len(err.splitlines()) == 2, err
     for wrong, said in ((address, "Connection refused"), ("here", "not the address of")):
-        with pytest.raises(Problem, match=said):
-            ray_connection._reach(wrong)
-    with pytest.raises(Problem, match="could not be started on this machine: It took too long."):
-        ray_connection._begin(mock.Mock(side_effect=Exception("It took too long.\nMore of it.")))
+        refuses(said, ray_connection._reach, wrong)
+    refuses(
+        "could not be started on this machine: It took too long.",
+        ray_connection._begin,
+        mock.Mock(side_effect=Exception("It took too long.\nMore of it.")),
+    )
     monkeypatch.setitem(sys.modules, "ray", None)
     assert main(["batch", "run", str(batch.root), "--on", "ray"]) == 2
     assert "requirements/farm.txt" in capsys.readouterr().err

@@ -18,6 +18,7 @@ from core.capture.files import replacing, write_json
 from core.capture.messages import CancelledError, Problem
 from core.worker.job import wait_until_free, write_job
 from tests.fixtures.kept_capture import NO_PROCESS, fork, make, needs_fork
+from tests.fixtures.refused import refuses
 
 RACES = int(os.environ.get("WILDCAP_RACES", 30))
 
@@ -40,8 +41,7 @@ def test_a_worker_that_is_at_work_is_refused_at_once_by_name(capture):
     with capture.locked():
         began = time.monotonic()
         for attempt in (Capture(capture.root).locked().__enter__, capture.check_free):
-            with pytest.raises(Problem, match=f"process {os.getpid()}"):
-                attempt()
+            refuses(f"process {os.getpid()}", attempt)
         assert time.monotonic() - began < 1
     assert not capture.lock.exists()
     capture.check_free()
@@ -116,8 +116,7 @@ def test_a_job_can_be_given_to_a_worker_that_will_take_over_what_was_left_long_a
     """As by a Blender that was closed in the middle of a job, in a container that is another one each time."""
     text = left and written_by(host="another machine" if left == "another machine" else processes.name_host() + "0")
     capture.lock.write_text(text)
-    with pytest.raises(Problem, match="nother worker"):
-        write_job(capture)
+    refuses("nother worker", write_job, capture)
     assert not capture.job.exists() and lease.present_holder(capture.lock) is not None
     os.utime(capture.lock, (0, time.time() - 1))
     assert lease.present_holder(capture.lock) is None and lease.holder(capture.lock) is not None
@@ -125,8 +124,7 @@ def test_a_job_can_be_given_to_a_worker_that_will_take_over_what_was_left_long_a
     assert capture.lock.read_text() == text, "who takes it over waits for a term of its own"
     with capture.locked():
         os.utime(capture.lock, (0, 0))
-        with pytest.raises(Problem, match=f"process {os.getpid()}"):
-            write_job(capture)
+        refuses(f"process {os.getpid()}", write_job, capture)
 
 
 def test_a_disk_that_does_not_answer_for_a_moment_costs_nobody_the_lease(capture, monkeypatch):
@@ -180,8 +178,7 @@ def test_who_was_replaced_writes_nothing_more(capture):
             lambda: capture.stop("x", Problem("a", "b")),
             write_deep,
         ):
-            with pytest.raises(Problem, match="capture over"):
-                attempt()
+            refuses("capture over", attempt)
         assert contents() == before
 
 
@@ -232,6 +229,5 @@ def test_what_is_no_lock_is_refused_by_name_and_not_waited_for(capture, kind):
     else:
         capture.lock.symlink_to("nowhere" if kind == "dangling link" else capture.lock.name)
     for attempt in (capture.check_free, capture.locked().__enter__):
-        with pytest.raises(Problem, match="in the way"):
-            attempt()
+        refuses("in the way", attempt)
     assert os.path.lexists(capture.lock)

@@ -6,7 +6,6 @@ import json
 
 import pytest
 
-from core.capture.messages import Problem
 from core.settings.settings import (
     QUALITIES,
     STAGE_KINDS,
@@ -19,6 +18,7 @@ from core.settings.settings import (
     to_json,
     tooltips,
 )
+from tests.fixtures.refused import refuses
 
 PATHS = [name for name, field in known_settings().items() if "path" in field.metadata]
 
@@ -40,8 +40,7 @@ def test_presets_differ_survive_json_and_standard_is_the_default():
     presets = [preset(quality) for quality in QUALITIES]
     assert [from_json(json.loads(json.dumps(to_json(each)))) for each in presets] == presets
     assert preset("standard") == Settings() and len(set(presets)) == len(QUALITIES)
-    with pytest.raises(Problem, match="draft"):
-        preset("superb")
+    refuses("draft", preset, "superb")
 
 
 @pytest.mark.parametrize("name", known_settings())
@@ -60,8 +59,7 @@ def test_every_setting_has_a_tooltip_a_valid_default_and_limits_that_hold(name):
     assert ("path" in limits) <= (field.default == ""), "a place is never chosen beforehand"
     wrong = [[1], *([limits["min"] - 1, limits["max"] + 1] if "min" in limits else [])]
     for value in [*wrong, *(["something else"] if "choices" in limits else [])]:
-        with pytest.raises(Problem, match=own or stage):
-            choose(value)
+        refuses(own or stage, choose, value)
 
 
 @pytest.mark.parametrize(
@@ -83,8 +81,7 @@ def test_every_setting_has_a_tooltip_a_valid_default_and_limits_that_hold(name):
     ],
 )
 def test_what_is_no_setting_is_refused(values, words):
-    with pytest.raises(Problem, match=words):
-        from_json(values)
+    refuses(words, from_json, values)
 
 
 @pytest.mark.parametrize(
@@ -95,8 +92,7 @@ def test_what_is_no_setting_is_refused(values, words):
     ],
 )
 def test_the_nearest_setting_is_named(wrong, right):
-    with pytest.raises(Problem, match=f"Did you mean {right}\\?"):
-        find_setting(wrong)
+    refuses(f"Did you mean {right}\\?", find_setting, wrong)
 
 
 def test_a_whole_number_does_for_a_fraction():

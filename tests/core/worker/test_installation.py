@@ -12,12 +12,13 @@ from pathlib import Path
 import pytest
 
 from core.capture import processes
-from core.capture.messages import Cancelled, Done, Failed, Problem, Progress
+from core.capture.messages import Cancelled, Done, Failed, Progress
 from core.worker import bare_environment, index, installation
 from core.worker.background import BackgroundTask
 from core.worker.environment import COMPUTE_FILE, empty, python_of, remove, verify
 from core.worker.locks import Lock
 from core.worker.pip_steps import PipStep
+from tests.fixtures.refused import refuses
 from tests.fixtures.tiny_packages import follow, run, write_lock, write_wheel
 
 REQUIREMENTS = Path(__file__).resolve().parents[3] / "requirements"
@@ -159,8 +160,7 @@ def test_what_an_installation_brings_is_known_before_it_begins(local, wheels, co
     )
     assert str(local / "locks" / "pip.txt") in commands[0]
     assert index.check_space(known, tmp_path / "not" / "there") > known.needed == known.download + known.disk
-    with pytest.raises(Problem, match="needed"):
-        index.check_space(replace(known, disk=1 << 60), tmp_path)
+    refuses("needed", index.check_space, replace(known, disk=1 << 60), tmp_path)
     task = BackgroundTask("index", lambda task: plan(task, (1, "ERROR: No matching distribution.")))
     assert "(No matching distribution)" in run(task)[-1].problem
 
@@ -170,10 +170,8 @@ def test_other_peoples_folders_are_left_alone(local, tmp_path):
     mine.mkdir()
     for name in ("a.jpg", "pyvenv.cfg"):  # the second makes it an environment of somebody else's
         (mine / name).write_text("mine")
-        with pytest.raises(Problem, match="other files"):
-            installing(mine, local)
-    with pytest.raises(Problem, match="no environment that WildCap made"):
-        remove(mine)
+        refuses("other files", installing, mine, local)
+    refuses("no environment that WildCap made", remove, mine)
     assert (mine / "a.jpg").is_file()
 
 
@@ -205,5 +203,4 @@ def test_an_installation_that_stops_says_why(tmp_path, monkeypatch, said, words)
 
 def test_a_machine_without_a_python_to_begin_with(monkeypatch):
     monkeypatch.setattr(installation, "answer", lambda *_: "")
-    with pytest.raises(Problem, match="does not answer"):
-        installation.base_python()
+    refuses("does not answer", installation.base_python)

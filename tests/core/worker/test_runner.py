@@ -13,10 +13,11 @@ import pytest
 from core.capture import stages
 from core.capture.capture import Capture
 from core.capture.files import storage_problem
-from core.capture.messages import Done, Failed, Problem
+from core.capture.messages import Done, Failed
 from core.capture.report import findings
 from core.worker import runner
 from core.worker.job import read_job, write_job
+from tests.fixtures.refused import refuses
 from tests.fixtures.tiny_chain import contents, finished, run_here, tiny_room
 
 
@@ -94,8 +95,7 @@ def test_a_capture_that_is_worked_on_is_refused_and_its_job_stays(capture, video
     job = write_job(capture, source=video)
     before = job.read_bytes()
     with capture.locked():
-        with pytest.raises(Problem, match=f"process {os.getpid()}"):
-            write_job(capture)
+        refuses(f"process {os.getpid()}", write_job, capture)
         final = runner.run_job(job)
         assert isinstance(final, Failed) and f"process {os.getpid()}" in final.problem
     assert job.read_bytes() == before
@@ -135,13 +135,11 @@ def test_jobs_that_cannot_be_are_refused(capture, video):
         ({"first": "solve", "last": "frames"}, "comes after"),
         ({"tool": "lunch"}, "'lunch'"),
     ):
-        with pytest.raises(Problem, match=words):
-            write_job(capture, source=video, **job)
+        refuses(words, write_job, capture, source=video, **job)
     for text, words in (
         ("{", "cannot be read"),
         (json.dumps({"capture": ".", "settings": {"registration": -1}}), "cannot be used: .* registration"),
     ):
         capture.job.write_text(text, encoding="utf-8")
-        with pytest.raises(Problem, match=words):
-            read_job(capture.job)
+        refuses(words, read_job, capture.job)
         assert isinstance(runner.run_job(capture.job), Failed)

@@ -15,11 +15,12 @@ import pytest
 
 from core.capture import stages
 from core.capture.capture import Capture
-from core.capture.messages import Cancelled, Done, Failed, Problem, Progress
+from core.capture.messages import Cancelled, Done, Failed, Progress
 from core.worker import client
 from core.worker.__main__ import NICE_VALUE
 from core.worker.client import GRACE_S, Worker
 from tests.fixtures import tiny_chain
+from tests.fixtures.refused import refuses
 from tests.fixtures.tiny_chain import contents, finished, follow, start
 
 
@@ -120,8 +121,10 @@ def test_a_worker_that_dies_or_is_terminated_says_where(tiny_code, capture, vide
 
 
 def test_a_python_that_is_none_is_told(tiny_code, capture):
-    with pytest.raises(Problem, match="could not be started"):
-        Worker(capture.root / "no python", tiny_code, capture.job, capture.logs / "worker.log").start()
+    refuses(
+        "could not be started",
+        Worker(capture.root / "no python", tiny_code, capture.job, capture.logs / "worker.log").start,
+    )
 
 
 def test_only_protocol_lines_leave_by_stdout(tiny_code, capture, video):

@@ -20,6 +20,7 @@ pytest.importorskip("OpenImageIO", reason="the worker's part needs its packages"
 
 from tests.fixtures import delivered, mesh_reader  # noqa: E402
 from tests.fixtures.delivered import KEYS  # noqa: E402
+from tests.fixtures.refused import refuses  # noqa: E402
 
 CLAMPED, REPEATED = 33071, 10497  # in glTF
 HAIRS = np.array(
@@ -124,8 +125,7 @@ def test_gltf_with_files_refers_to_the_delivered_maps(deliver):
 def test_a_metahuman_gets_open_eyes_and_no_shape_keys(capture, deliver):
     pytest.importorskip("ufbx")
     bpy.context.scene.wildcap.captures[0].deliver.preset = 'metahuman'
-    with pytest.raises(RuntimeError, match="lids are closed"):
-        bpy.ops.wildcap.deliver()
+    refuses("lids are closed", bpy.ops.wildcap.deliver)
     head, moved = bpy.data.objects["face"], truth()
     for name, rows in (("eyesOpenLeft", slice(200, 210)), ("eyesOpenRight", slice(300, 310))):
         for point in head.shape_key_add(name=name, from_mix=False).data[rows]:
@@ -198,8 +198,7 @@ def test_a_read_only_capture_is_delivered_to_another_folder_and_nothing_in_it_ch
         os, "access", lambda path, mode: access(path, mode) and (mode != os.W_OK or Path(path) != capture.root)
     )
     before = contents()
-    with pytest.raises(RuntimeError, match="read-only"):
-        bpy.ops.wildcap.deliver()
+    refuses("read-only", bpy.ops.wildcap.deliver)
     bpy.context.scene.wildcap.captures[0].deliver.folder = str(tmp_path / "out")
     assert bpy.ops.wildcap.deliver() == {'FINISHED'}
     (folder,) = (tmp_path / "out").iterdir()

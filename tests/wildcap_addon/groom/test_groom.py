@@ -13,6 +13,7 @@ bpy = pytest.importorskip("bpy")
 from tests.fixtures import standin  # noqa: E402
 from tests.fixtures.acting_heads import reopen, write_head  # noqa: E402
 from tests.fixtures.grown_hair import save_strands, write_strands  # noqa: E402
+from tests.fixtures.refused import refuses  # noqa: E402
 
 LENGTH_M = 0.006 * np.hypot(1, 0.2)
 PLAIN = {"brows_points": np.zeros((2, 5, 3)), "brows_radius": np.zeros((2, 5)), "brows_colour": np.zeros((2, 3))}
@@ -199,6 +200,5 @@ def test_hair_is_in_the_picture_and_goes_aside_with_its_head(hair, addon):
 def test_hair_that_is_not_there_or_damaged_is_refused(capture, addon, monkeypatch, harm, word):
     monkeypatch.setattr(addon("groom.operators"), "MOST_BYTES", 1 << 20)
     harm(capture / "maps" / "strands.npz")
-    with pytest.raises(RuntimeError, match=word):
-        bpy.ops.wildcap.grow_hair()
+    refuses(word, bpy.ops.wildcap.grow_hair)
     assert not hairs(addon)

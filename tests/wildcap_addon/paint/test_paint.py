@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.fixtures import standin
+from tests.fixtures.refused import refuses
 
 bpy = pytest.importorskip("bpy")
 
@@ -100,8 +101,7 @@ def test_what_is_protected_is_a_mask_of_its_own(session, mask_image, capture, he
     click.finish_mask()
     click.paint_mask(mask='PROTECT')
     assert mask_image.grey_png(mask_image.mask_values(paint.stencil_image)) == painted
-    with pytest.raises(RuntimeError, match="no proposal for the protect mask"):
-        click.edit_mask(kind='PROPOSAL')
+    refuses("no proposal for the protect mask", click.edit_mask, kind='PROPOSAL')
     click.finish_mask()
     assert path.read_bytes() == painted
 

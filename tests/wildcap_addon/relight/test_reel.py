@@ -10,6 +10,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 from tests.fixtures.flat_patch import pixels  # noqa: E402
+from tests.fixtures.refused import refuses  # noqa: E402
 
 
 def set_keys(head, *keys: tuple[float, float]) -> None:
@@ -80,8 +81,7 @@ def test_the_contact_sheet_of_an_animated_head_is_that_of_its_pose(addon, captur
     assert np.abs(again - still).mean() < 0.005, "but for noise, the same"
     assert not hidden(capture / "renders") and bpy.context.scene.frame_current == 20
     bpy.context.scene.frame_set(-3)
-    with pytest.raises(RuntimeError, match="Frame -3"):
-        bpy.ops.wildcap.contact_sheet()
+    refuses("Frame -3", bpy.ops.wildcap.contact_sheet)
 
 
 @pytest.mark.parametrize("turns", ['HEAD', 'LIGHT'])
@@ -139,8 +139,7 @@ def test_the_buttons_render_what_the_panel_says_and_wait_for_each_other(addon, c
     assert len(list((renders / "turntable").iterdir())) == 2 and (renders / "contact_sheet.png").is_file()
     monkeypatch.setattr(addon("relight.output"), "busy", lambda: True)
     for name in ("render", "turntable", "contact_sheet"):
-        with pytest.raises(RuntimeError, match="Blender is rendering"):
-            getattr(bpy.ops.wildcap, name)()
+        refuses("Blender is rendering", getattr(bpy.ops.wildcap, name))
 
 
 @pytest.mark.parametrize(
@@ -156,8 +155,7 @@ def test_a_turntable_that_cannot_be_is_refused_before_it_is_rendered(
 ):
     headless = addon("relight.headless")
     monkeypatch.setattr(addon("relight.reel"), "can_film", lambda: ffmpeg)
-    with pytest.raises(headless.Problem, match=word):
-        headless.render_turntable(capture, light, turns, 2, film, resolution=resolution, samples=1)
+    refuses(word, headless.render_turntable, capture, light, turns, 2, film, resolution=resolution, samples=1)
     assert not (capture / "renders").exists()
 
 
