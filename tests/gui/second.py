@@ -42,7 +42,7 @@ def heard(process: subprocess.Popen, folder: Path, name: str, limit_s: float):
 def solve_and_paint():
     """A stroke while its solver runs; it then waits to be killed."""
     root = yield from solving()
-    yield from stroke(0, "stroke")
+    yield from stroke(0)
     tell("stroked", worker=addon.worker_process(root).pid)
     yield 600.0
 
@@ -50,29 +50,9 @@ def solve_and_paint():
 def solve_and_quit():
     """A stroke while its solver runs, and File > Quit at once."""
     root = yield from solving()
-    yield from stroke(40, "stroke")
+    yield from stroke(40)
     tell("stroked", worker=addon.worker_process(root).pid)
     bpy.ops.wm.quit_blender()
-    yield 600.0
-
-
-def refused_and_paint():
-    """A solve of what the first Blender solves, and strokes on the mask that is painted there, each told of when it is
-    in the capture."""
-    root = yield from addon.open_sample_head()
-    addon.use_solver()
-    yield 1.5
-    try:
-        bpy.ops.wildcap.solve()
-    except RuntimeError as error:
-        tell("refused", text=str(error), job=addon.job(root) is not None)
-    bpy.ops.wildcap.paint_mask()
-    yield from painting.in_hand()
-    tell("painting")
-    yield from d.until(lambda: (FOLDER / "paint.json").is_file(), "its turn", 120)
-    mask = yield from stroke(0, "stroke")
-    yield from painting.kept(root / "shadow_mask.png", mask, 8)
-    tell("kept")
     yield 600.0
 
 
@@ -89,7 +69,7 @@ def walk_and_quit():
     yield from d.until(lambda: len(batches.waiting()) == 2, "two masks that wait", 30)
     yield from d.press("wildcap.next_mask")
     yield from painting.in_hand()
-    yield from stroke(0, "stroke")
+    yield from stroke(0)
     d.screenshot("batch_1_walk")
     yield from d.press("wildcap.accept_mask")
     yield from d.until(
@@ -119,16 +99,14 @@ def solving():
     return root
 
 
-def stroke(offset: float, name: str):
+def stroke(offset: float):
     """Paints, and leaves the mask as it is then where the flow finds it, rows from the top."""
     if bpy.context.mode != 'PAINT_TEXTURE':
         bpy.ops.wildcap.paint_mask()
         yield from painting.in_hand()
     x, y = d.middle()
     yield from painting.visible_dab(x - 30 + offset, y - 40)
-    mask = painting.mask()
-    np.save(FOLDER / f"{name}.npy", mask)
-    return mask
+    np.save(FOLDER / "stroke.npy", painting.mask())
 
 
 def tell(name: str, **what) -> None:

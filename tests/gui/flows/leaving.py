@@ -1,15 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A painting session's ends, in the window: leaving gives the artist's things back, and a file saved in the middle goes
-on."""
-
-import tempfile
-from pathlib import Path
+"""Leaving a painting session in the window gives the artist's things back."""
 
 import addon
 import bpy
 import driver as d
-import numpy as np
 import painting
 
 
@@ -18,7 +13,6 @@ def flow():
     own_things()
     for mode, protect in (('SCULPT', False), ('TEXTURE_PAINT', True)):
         yield from leave(mode, protect)
-    yield from reopen()
 
 
 def own_things() -> None:
@@ -112,24 +106,3 @@ def plain(thing) -> dict:
                 tuple(value) if getattr(each, "is_array", False) else sorted(value) if isinstance(value, set) else value
             )
     return found
-
-
-def reopen():
-    """Saved while painting, opened again: the brush is in hand, and a stroke still reaches the capture."""
-    blend = Path(tempfile.mkdtemp()) / "middle.blend"
-    bpy.ops.wildcap.paint_mask()
-    yield 1.0
-    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
-    painted = painting.mask()
-    bpy.ops.wm.open_mainfile(filepath=str(blend))
-    yield 2.0
-    assert bpy.context.mode == 'PAINT_TEXTURE' and np.abs(painting.mask() - painted).max() < 0.01
-    yield from d.open_tab("WildCap")
-    x, y = d.middle()
-    yield from painting.visible_dab(x - 30, y - 50)  # the mask brush is still in hand
-    yield from d.park()
-    d.screenshot("painting_goes_on")
-    yield from d.lead("wildcap.finish_mask")
-    yield 1.0
-    assert bpy.context.mode == 'OBJECT' and not any("WildCap" in brush.name for brush in bpy.data.brushes)
-    d.say("went on after opening the file")
