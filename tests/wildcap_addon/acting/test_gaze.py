@@ -110,11 +110,13 @@ def test_a_second_click_gives_the_sliders_back_though_a_unit_is_gone(head, empty
     assert keys["eyeLookOutLeft"].value == 0 and not drivers(head) and keys["eyeLookDownLeft"].slider_max == 1
 
 
-def test_the_eyes_of_another_shape_look_at_it_too(head, empty, addon):
+def test_the_eyes_of_another_shape_look_at_it_too_and_a_click_brings_a_deleted_one_back(head, empty, addon):
     write_head(capture_of(head), 1.2)
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.assemble_material()
     check_looks(head, empty, ((11, 5),), lambda: looks(head, addon("acting.asset").load()))
+    bpy.data.objects.remove(empty)
+    assert bpy.ops.wildcap.gaze() == {'FINISHED'} and addon("acting.gaze").of(head) is not None
 
 
 def test_eyes_turn_as_far_as_the_guide_says(head, addon):
@@ -131,8 +133,3 @@ def test_a_driver_of_the_artists_is_not_taken_away(head, addon):
     key.driver_add("value").driver.expression = "0.3"
     refuses("eyeLookInRight", bpy.ops.wildcap.gaze)
     assert addon("acting.gaze").of(head) is None and [driver.expression for driver in drivers(head)] == ["0.3"]
-
-
-def test_an_empty_that_was_deleted_comes_back_by_a_click(head, empty, addon):
-    bpy.data.objects.remove(empty)
-    assert bpy.ops.wildcap.gaze() == {'FINISHED'} and addon("acting.gaze").of(head) is not None
