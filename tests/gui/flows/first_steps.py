@@ -28,16 +28,10 @@ def flow():
 
 
 def drop(home: Path):
-    """A video dropped on the tab, by the operator that Blender calls for it: a capture with accents and spaces in its
-    name, ready for its large button."""
+    """A video dropped on the tab: a capture with accents and spaces in its name, ready for its large button."""
     video = home / "Mein Gesicht é.mp4"
     video.write_bytes(b"no video yet")
-    with d.in_view('UI'):
-        bpy.ops.wm.drop_import_file('INVOKE_DEFAULT', directory=str(home), files=[{"name": video.name}])
-    yield 1.0
-    d.screenshot("first_1_drop_menu")
-    yield from d.key('C')  # Blender asks: a reference, or Choose Video
-    yield from d.until(lambda: len(items()) == 1, "the dropped video's capture", 10)
+    yield from addon.drop(home, video.name)
     assert Path(items()[0].path) == Path.home() / "WildCap" / "Mein Gesicht é.wildcap"
     addon.use_solver()
     yield 1.5
