@@ -132,12 +132,10 @@ def test_ctrl_c_cancels_cleanly(tiny_code, capture, film):
 @pytest.mark.parametrize(
     "words",
     [
-        ("run", "a", "b", "--from", "solve", "--until", "frames"),
         ("run", "a", "b", "--until", "lunch"),
         ("run", "a", "b", "--skin-tone", "pink"),
         ("run", "a", "b", "--skin-tone", "200,160,1400"),
         ("run", "a", "b", "--white-point", "0,1,1"),
-        ("run", "a", "b", "--folder", "c"),
         ("status", "/no/such/capture"),
         ("deliver", "/no/such/capture"),
         ("mask", "import", "CAPTURE", "mask.png"),

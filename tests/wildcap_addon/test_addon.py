@@ -114,9 +114,7 @@ def test_an_error_is_shown_as_a_problem_with_a_remedy(addon, capture, monkeypatc
     assert "An error inside WildCap stopped" in problem.problem and problem.remedy
 
 
-def test_the_head_comes_in_upright_with_its_uvs_and_again_in_place(addon, capture):
-    bpy.ops.wildcap.bring_in_head()
-    head = bpy.context.view_layer.objects.active
+def test_the_head_comes_in_upright_with_its_uvs_and_again_in_place(capture, head):
     assert head["wildcap_capture"] == str(capture)
     assert tuple(head.dimensions) == pytest.approx((0.16, 0.1 - 0.1 * math.cos(0.8 * math.pi), 0.24), abs=2e-3)
     assert head.bound_box[0][1] == pytest.approx(-0.1, abs=1e-4)  # the face, towards -Y

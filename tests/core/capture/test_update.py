@@ -93,16 +93,3 @@ def test_a_setting_that_a_stage_has_got_since_makes_nothing_stale(finished, stag
 )
 def test_a_setting_that_changed_is_told(finished, changed, told):
     assert stale(finished, made_with(finished, **changed)) == told
-
-
-def test_an_input_that_changed_is_told(finished):
-    beside = finished.root.parent
-    finished.shadow_mask.write_bytes(b"painted since")
-    assert stale(finished, made_with(finished)) == {"solve": ("shadow_mask.png",)}
-    (beside / "my head.obj").write_bytes(b"another head")
-    (beside / "film.mp4").write_bytes(b"A FILM")  # as long as the other
-    told = {"frames": (SOURCE,), "registration": (TEMPLATE,), "solve": ("shadow_mask.png",)}
-    assert stale(finished, made_with(finished)) == told
-    for name in ("film.mp4", "my head.obj"):
-        (beside / name).unlink()
-    assert stale(finished, made_with(finished)) == {"solve": ("shadow_mask.png",)}, "what is gone tells no change"
