@@ -81,7 +81,7 @@ def install(folder: Path, requirements: Path, **options):
     return run(installing(folder, requirements, **options))[-1]
 
 
-def test_the_life_of_an_environment(local, wheels, tmp_path, request):
+def test_the_life_of_an_environment(local, wheels, copied, tmp_path):
     folder = tmp_path / "Umgebung é"
     (folder / "lib" / "half").mkdir(parents=True)  # half made, as a machine that was switched off leaves it
     (folder / COMPUTE_FILE).write_text("")
@@ -103,7 +103,6 @@ def test_the_life_of_an_environment(local, wheels, tmp_path, request):
     assert isinstance(install(folder, local, compute="auto"), Done) and (folder / "kept").exists()
     assert verify(python_of(folder), local) == []
 
-    request.getfixturevalue("copied")
     (module,) = folder.rglob("tinytorch/__init__.py")
     shutil.rmtree(module.parent)
     told = verify(python_of(folder), local, importing=True)
