@@ -21,6 +21,7 @@ from core.capture.files import write_json
 from core.capture.messages import Progress
 from core.capture.stages import NAMES
 from tests.fixtures import tiny_batch
+from tests.fixtures.polled_jobs import wait
 from tests.fixtures.refused import refuses
 from tests.fixtures.tiny_batch import core, finish, finished, lines, make, set_mood, states
 
@@ -146,10 +147,7 @@ def test_whatever_ends_it_nothing_is_lost_and_it_goes_on(code, tmp_path, way):
         process.communicate(timeout=20)
     assert way == "killed" or time.monotonic() - began < 2.5
     assert process.returncode == {"killed": -9}.get(way, 130)
-    deadline = time.monotonic() + 5
-    while lease.holder(capture.lock):  # a worker whose starter was killed ends by itself
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    wait(lambda: not lease.holder(capture.lock), 5)  # a worker whose starter was killed ends by itself
     once = finished(batch)["a"]
     assert list(once) == ["frames", "cameras"]
     if way in ("killed", "stop"):

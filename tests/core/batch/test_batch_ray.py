@@ -29,6 +29,7 @@ from core.capture import lease
 from core.capture.hashes import hash_file
 from core.capture.messages import Problem
 from tests.fixtures import tiny_batch
+from tests.fixtures.polled_jobs import wait
 from tests.fixtures.refused import refuses
 from tests.fixtures.tiny_batch import core, finish, finished, lines, make, set_mood, states
 
@@ -73,13 +74,6 @@ def meanwhile(work):
     assert not errors, errors
 
 
-def wait_for(condition) -> None:
-    deadline = time.monotonic() + WAIT_S
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-
-
 def account(batch) -> list[dict]:
     """What the nodes say that they began and finished."""
     paths = (batch.root / ray_task.LOGS).glob("*.jsonl")
@@ -101,7 +95,7 @@ def test_a_killed_task_is_done_again_and_nothing_that_was_done(code, cluster, tm
     once = finished(batch)["e"]
 
     def kill() -> None:
-        wait_for(lambda: at_stage(batch, "a", "scan"))
+        wait(lambda: at_stage(batch, "a", "scan"), WAIT_S)
         set_mood(batch.face("a").capture, {})
         os.kill(at_stage(batch, "a", "scan")[0]["pid"], signal.SIGKILL)
 
@@ -130,14 +124,14 @@ def test_it_is_cancelled_within_two_seconds(code, cluster, tmp_path, way):
     captures, took = [face.capture for face in batch.faces], []
 
     def cancel() -> None:
-        wait_for(lambda: sum(any(c.root.glob(".scan*")) for c in captures) >= min(2, os.cpu_count()))
-        wait_for(lambda: local_progress(batch).get("a", {}).get("stage") == "Scan")
+        wait(lambda: sum(any(c.root.glob(".scan*")) for c in captures) >= min(2, os.cpu_count()), WAIT_S)
+        wait(lambda: local_progress(batch).get("a", {}).get("stage") == "Scan")
         began = time.monotonic()
         if way == "stop":
             (batch.root / local.STOP).touch()
         else:
             os.kill(os.getpid(), signal.SIGINT)
-        wait_for(lambda: not any(lease.holder(capture.lock) for capture in captures))
+        wait(lambda: not any(lease.holder(capture.lock) for capture in captures), WAIT_S)
         took.append(time.monotonic() - began)
 
     with meanwhile(cancel):

@@ -15,7 +15,6 @@ from core.capture.capture import Capture
 from core.capture.frame_records import read_frames
 from core.capture.json_files import read_json
 from core.capture.regular_files import require_regular
-from core.worker import command_settings
 from core.worker.job import write_job
 from tests.fixtures.recorded import make_entry
 from tests.fixtures.refused import refused
@@ -32,24 +31,6 @@ WRONG = [
     '"\\ud800"',
     '{"stages": ["\\ud800"]}',
 ]
-
-
-@pytest.mark.parametrize(
-    "encode",
-    [
-        lambda value: b"\xef\xbb\xbf" + json.dumps(value).encode(),
-        lambda value: json.dumps(value, indent=2).replace("\n", "\r\n").encode(),
-        lambda value: json.dumps(value).replace("s", "\\u0073").encode(),
-        lambda value: b"\n\n  " + json.dumps(value, indent="\t").encode() + b"\n\n",
-    ],
-    ids=["byte order mark", "CRLF", "escapes", "blank lines"],
-)
-def test_json_may_be_written_in_any_style(place, encode):
-    path, settings = place(".json"), {"frames": {"views": 5}, "seed": 7}
-    path.write_bytes(encode(settings))
-    assert command_settings.read_file(path) == settings and read_json(path) == settings
-    path.write_bytes(encode({"points": {"152": [0.0, -0.1, -0.1], "1": [0, -1.3e-1, -0.03]}}))
-    assert artist_landmarks.read(path) == {152: (0.0, -0.1, -0.1), 1: (0, -0.13, -0.03)}
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from core.capture.files import replacing, write_json
 from core.capture.messages import CancelledError, Problem
 from core.worker.job import wait_until_free, write_job
 from tests.fixtures.kept_capture import NO_PROCESS, fork, make, needs_fork
+from tests.fixtures.polled_jobs import wait
 from tests.fixtures.refused import refuses
 
 RACES = int(os.environ.get("WILDCAP_RACES", 30))
@@ -152,10 +153,7 @@ def test_a_lock_that_does_not_fit_on_the_disk_is_not_left_behind(capture, monkey
 def test_the_holder_refreshes_and_gives_back_only_its_own(capture, soon):
     with capture.locked():
         before = capture.lock.stat().st_mtime_ns
-        deadline = time.monotonic() + 5
-        while capture.lock.stat().st_mtime_ns == before:
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
+        wait(lambda: capture.lock.stat().st_mtime_ns != before, 5)
         capture.lock.write_text(written_by(host="another machine"))
     assert "another machine" in capture.lock.read_text()
 

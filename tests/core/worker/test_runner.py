@@ -91,16 +91,6 @@ def test_a_write_that_fails_is_named_by_the_file_it_was_for(tmp_path, code, word
     assert problem.problem == storage_problem(OSError(code, os.strerror(code)), path).problem
 
 
-def test_a_capture_that_is_worked_on_is_refused_and_its_job_stays(capture, video):
-    job = write_job(capture, source=video)
-    before = job.read_bytes()
-    with capture.locked():
-        refuses(f"process {os.getpid()}", write_job, capture)
-        final = runner.run_job(job)
-        assert isinstance(final, Failed) and f"process {os.getpid()}" in final.problem
-    assert job.read_bytes() == before
-
-
 def test_a_video_that_is_gone_is_missed_only_until_its_frames_are_taken(capture, video):
     assert run_here(capture)[-1].problem == "This capture has no video yet."
     aside = video.with_suffix(".aside")
