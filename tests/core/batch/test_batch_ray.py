@@ -125,7 +125,7 @@ def test_it_is_cancelled_within_two_seconds(code, cluster, tmp_path, way):
 
     def cancel() -> None:
         wait(lambda: sum(any(c.root.glob(".scan*")) for c in captures) >= min(2, os.cpu_count()), WAIT_S)
-        wait(lambda: local_progress(batch).get("a", {}).get("stage") == "Scan")
+        wait(lambda: local_progress(batch).get("a", {}).get("stage") == "Scan", WAIT_S)
         began = time.monotonic()
         if way == "stop":
             (batch.root / local.STOP).touch()
