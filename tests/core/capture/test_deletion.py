@@ -69,28 +69,6 @@ def test_an_empty_folder_of_somebody_s_stays(capture):
     assert [path.name for path in capture.root.iterdir()] == ["ideas"]
 
 
-def test_killed_at_any_file_it_can_be_asked_for_again(capture, monkeypatch):
-    kept = strangers(capture)
-    unlink = type(capture.root).unlink
-    for moment in range(1, 40):
-        left = iter(range(moment))
-
-        def counted(path, *arguments, left=left, **options):
-            if path.name != "lock" and next(left, None) is None:
-                raise KeyboardInterrupt
-            unlink(path, *arguments, **options)
-
-        with monkeypatch.context() as patched:
-            patched.setattr(type(capture.root), "unlink", counted)
-            try:
-                deletion.delete(capture)
-                break
-            except KeyboardInterrupt:
-                pass
-    assert moment > 3 and not (capture.root / ownership.RECORD).exists()
-    assert {name: text for name, text in kept_capture.contents(capture.root).items() if name in kept} == kept
-
-
 def test_the_terminal_lists_first_and_deletes_when_told_to(capture, capsys):
     assert main(["delete", str(capture.root)]) == 0
     assert "Renders" in capsys.readouterr().out and capture.head.exists(), "only listed"
