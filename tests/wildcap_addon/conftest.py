@@ -20,9 +20,9 @@ def drawn_once(enabled_extension):
 
 @pytest.fixture
 def few_units(addon, drawn_once, monkeypatch):
-    """Have heads get the eyes' face units and two others, where it does not matter which: all of them take seconds."""
+    """Have heads get few of the face units, where it does not matter which: all of them take seconds."""
     asset = addon("acting.asset").load()
-    few = {name: unit for name, unit in asset.units.items() if name.startswith(("eye", "jawOpen", "browInnerUp"))}
+    few = {name: unit for name, unit in asset.units.items() if name.startswith(("eye", "jaw", "tongue", "browInner"))}
     monkeypatch.setitem(vars(asset), "units", few)
 
 
