@@ -42,6 +42,11 @@ def copy(tmp_path_factory) -> Iterator[Path]:
     forget()
 
 
+@pytest.fixture(scope="module")
+def before(copy) -> dict[str, str]:
+    return keys(copy)
+
+
 def forget() -> None:
     for cached in (code_key.code_key, code_key._closure):  # a changed module is read again by itself
         cached.cache_clear()
@@ -91,8 +96,8 @@ def test_the_closure_is_all_that_a_stage_imports_however_far_away():
         ("weights/prior.safetensors", {"solve", "upscale"}),
     ],
 )
-def test_an_edit_changes_exactly_the_stages_that_depend_on_the_file(copy, file, expected):
-    before, content = keys(copy), (copy / file).read_bytes()
+def test_an_edit_changes_exactly_the_stages_that_depend_on_the_file(copy, before, file, expected):
+    content = (copy / file).read_bytes()
     (copy / file).write_bytes(content + b"\nADDED = 1\n")
     after = keys(copy)
     (copy / file).write_bytes(content)

@@ -21,7 +21,7 @@ from tests.fixtures.kept_capture import NO_PROCESS, fork, make, needs_fork
 from tests.fixtures.polled_jobs import wait
 from tests.fixtures.refused import refuses
 
-RACES = int(os.environ.get("WILDCAP_RACES", 30))
+RACES = int(os.environ.get("WILDCAP_RACES", 20))
 
 
 @pytest.fixture
