@@ -21,6 +21,7 @@ def flow():
     yield from d.click((x - 20, y - 24))
     props = bpy.context.scene.wildcap
     props.light, props.resolution, props.samples = 'three_point', 64, 2
+    yield from d.scroll(16)
     yield from contact_sheet(root)
     yield from turntable(root)
     from_a_terminal(root)
