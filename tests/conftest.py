@@ -117,10 +117,7 @@ def tiny_code(tmp_path_factory):
     """The code tree of tiny_chain, for tests that change nothing of it."""
     from tests.fixtures import tiny_chain
 
-    root = tiny_chain.build(tmp_path_factory.mktemp("tiny") / "code")
-    tiny_chain.set_nice(root, 0)
-    tiny_chain.compile_once(root)
-    return root
+    return tiny_chain.build(tmp_path_factory.mktemp("tiny") / "Erweiterung für mich")
 
 
 @pytest.fixture

@@ -40,6 +40,17 @@ def open_sample_head():
     return Path(head()["wildcap_capture"])
 
 
+def drop(folder: Path, *names: str):
+    """Files dropped on the tab, by the operator that Blender calls for it: they become one capture."""
+    d.act()
+    with d.in_view('UI'):
+        bpy.ops.wm.drop_import_file('INVOKE_DEFAULT', directory=str(folder), files=[{"name": name} for name in names])
+    yield 1.0
+    d.screenshot("drop_menu")
+    yield from d.key('C')  # Blender asks: a reference, or Choose Video
+    yield from d.until(lambda: len(bpy.context.scene.wildcap.captures) == 1, "one capture of what was dropped", 10)
+
+
 def head():
     return bpy.data.objects.get("sample_head")
 

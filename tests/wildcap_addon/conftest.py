@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heads with face units, built once per process and opened from a file for each test."""
+"""Heads for the add-on's tests."""
 
 from functools import cache
 from importlib import import_module
@@ -18,37 +18,18 @@ def drawn_once(enabled_extension):
         yield
 
 
-@pytest.fixture(scope="session")
-def saved_heads(drawn_once, tmp_path_factory):
-    """The folder of a capture beside which the files lie."""
-    from tests.fixtures import acting_heads
-
-    place = tmp_path_factory.mktemp("acting") / "Zoë et moi" / "head.wildcap"
-    acting_heads.build(place)
-    return place
-
-
 @pytest.fixture
-def few_units(addon, monkeypatch):
+def few_units(addon, drawn_once, monkeypatch):
     """Have heads get few of the face units, where it does not matter which: all of them take seconds."""
-    from tests.fixtures.acting_heads import SIDES
-
     asset = addon("acting.asset").load()
-    names = ("jawOpen", "browInnerUp", *(f"{kind}{side}" for kind in ("eyesOpen", "eyeBlink") for side in SIDES))
-    monkeypatch.setitem(vars(asset), "units", {name: asset.units[name] for name in names})
+    few = {name: unit for name, unit in asset.units.items() if name.startswith(("eye", "jaw", "tongue", "browInner"))}
+    monkeypatch.setitem(vars(asset), "units", few)
 
 
 @pytest.fixture
-def head(addon, saved_heads):
-    """A head with its material and its face units, active."""
-    from tests.fixtures import acting_heads
+def head(capture):
+    """The capture's head in the scene, active."""
+    import bpy
 
-    return acting_heads.reopen(saved_heads, "head")
-
-
-@pytest.fixture
-def close_up(addon, saved_heads):
-    """The same with a close-up."""
-    from tests.fixtures import acting_heads
-
-    return acting_heads.reopen(saved_heads, "close_up")
+    bpy.ops.wildcap.bring_in_head()
+    return bpy.context.view_layer.objects.active

@@ -11,7 +11,6 @@ import pytest
 
 from core.capture.capture import Capture
 from core.capture.messages import Problem
-from tests.fixtures import standin
 from tests.fixtures.drawn import draw, drawn
 from tests.fixtures.recorded import make_entry
 from tests.fixtures.refused import refuses
@@ -115,15 +114,7 @@ def test_an_error_is_shown_as_a_problem_with_a_remedy(addon, capture, monkeypatc
     assert "An error inside WildCap stopped" in problem.problem and problem.remedy
 
 
-def test_a_capture_of_a_newer_version_is_refused(addon, tmp_path):
-    root = standin.make(tmp_path / "new.wildcap")
-    (root / "capture.json").write_text('{"format": 99, "stages": {}}', encoding="utf-8")
-    refuses("newer version", bpy.ops.wildcap.open_capture, directory=str(root))
-
-
-def test_the_head_comes_in_upright_with_its_uvs_and_again_in_place(addon, capture):
-    bpy.ops.wildcap.bring_in_head()
-    head = bpy.context.view_layer.objects.active
+def test_the_head_comes_in_upright_with_its_uvs_and_again_in_place(capture, head):
     assert head["wildcap_capture"] == str(capture)
     assert tuple(head.dimensions) == pytest.approx((0.16, 0.1 - 0.1 * math.cos(0.8 * math.pi), 0.24), abs=2e-3)
     assert head.bound_box[0][1] == pytest.approx(-0.1, abs=1e-4)  # the face, towards -Y

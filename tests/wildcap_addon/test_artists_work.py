@@ -17,12 +17,6 @@ from tests.fixtures.refused import refuses
 bpy = pytest.importorskip("bpy")
 
 
-@pytest.fixture
-def obj(addon, item):
-    bpy.ops.wildcap.bring_in_head()
-    return addon("captures").head(bpy.context, item)
-
-
 def open_copy(capture: Path, root: Path) -> None:
     shutil.copytree(capture, root)
     bpy.ops.wildcap.open_capture(directory=str(root))
@@ -50,37 +44,37 @@ def test_a_picture_that_blender_packed_as_it_is_serves_again(addon, capture):
     assert fresh != image and image.use_fake_user and fresh.pixels[0] == pytest.approx(10 / 255, abs=1e-3)
 
 
-def test_nodes_that_were_added_to_the_texture_s_material_are_never_cleared(addon, obj):
-    material, edited = addon("relight.material"), obj.data.materials[0]
-    assert not material.is_edited(obj)
+def test_nodes_that_were_added_to_the_texture_s_material_are_never_cleared(addon, head):
+    material, edited = addon("relight.material"), head.data.materials[0]
+    assert not material.is_edited(head)
     edited.node_tree.nodes.new('ShaderNodeBump').name = "Mine"
-    assert material.is_edited(obj)
+    assert material.is_edited(head)
     bpy.ops.wildcap.assemble_material()
-    assert obj.data.materials[0] != edited and "Mine" in edited.node_tree.nodes and edited.use_fake_user
-    assert material.KEY in obj.data.materials[0]
+    assert head.data.materials[0] != edited and "Mine" in edited.node_tree.nodes and edited.use_fake_user
+    assert material.KEY in head.data.materials[0]
 
 
-def test_a_new_shape_of_the_same_topology_keeps_what_was_made_on_the_mesh(capture, obj):
-    obj.shape_key_add(name="Basis")
-    obj.shape_key_add(name="Wider").data[0].co.x += 0.5
-    obj.vertex_groups.new(name="Jaw").add([0, 1], 0.5, 'REPLACE')
-    obj.data.uv_layers.new(name="Mine")
-    mesh, before = obj.data, np.array([v.co for v in obj.data.vertices])
+def test_a_new_shape_of_the_same_topology_keeps_what_was_made_on_the_mesh(capture, head):
+    head.shape_key_add(name="Basis")
+    head.shape_key_add(name="Wider").data[0].co.x += 0.5
+    head.vertex_groups.new(name="Jaw").add([0, 1], 0.5, 'REPLACE')
+    head.data.uv_layers.new(name="Mine")
+    mesh, before = head.data, np.array([v.co for v in head.data.vertices])
     text = (capture / "head.obj").read_text(encoding="utf-8")
     raised = re.sub(r"^(v \S+ \S+) (\S+)", lambda m: f"{m[1]} {float(m[2]) + 0.1:.6f}", text, flags=re.MULTILINE)
     (capture / "head.obj").write_text(raised, encoding="utf-8")
     bpy.ops.wildcap.bring_in_head()
-    moved = np.array([v.co for v in obj.data.vertices]) - before
-    assert obj.data == mesh and np.ptp(moved, axis=0).max() < 1e-5
+    moved = np.array([v.co for v in head.data.vertices]) - before
+    assert head.data == mesh and np.ptp(moved, axis=0).max() < 1e-5
     assert np.abs(moved).max() == pytest.approx(0.1, abs=1e-5)
-    keys = obj.data.shape_keys.key_blocks
+    keys = head.data.shape_keys.key_blocks
     assert (keys["Wider"].data[0].co - keys["Basis"].data[0].co).length == pytest.approx(0.5, abs=1e-5)
-    assert "Mine" in obj.data.uv_layers and obj.vertex_groups["Jaw"].weight(1) == pytest.approx(0.5)
+    assert "Mine" in head.data.uv_layers and head.vertex_groups["Jaw"].weight(1) == pytest.approx(0.5)
 
 
-def test_the_flat_sheet_belongs_to_the_head_that_it_was_made_for(addon, capture, obj, tmp_path):
+def test_the_flat_sheet_belongs_to_the_head_that_it_was_made_for(addon, capture, head, tmp_path):
     open_copy(capture, tmp_path / "other.wildcap")
-    bpy.context.view_layer.objects.active = obj
+    bpy.context.view_layer.objects.active = head
     bpy.ops.wildcap.paint_mask(on='SHEET')
     try:
         assert Path(addon("captures").root(addon("captures").active(bpy.context))) == capture
@@ -88,10 +82,10 @@ def test_the_flat_sheet_belongs_to_the_head_that_it_was_made_for(addon, capture,
         bpy.ops.wildcap.finish_mask()
 
 
-def test_a_skin_that_was_linked_to_another_head_keeps_its_values_and_each_head_its_maps(addon, capture, obj, tmp_path):
+def test_a_skin_that_was_linked_to_another_head_keeps_its_values_and_each_head_its_maps(addon, capture, head, tmp_path):
     albedo, copied = addon("relight.material").IMAGES[0][0], tmp_path / "other.wildcap"
     bpy.ops.wildcap.assemble_material()
-    first = obj.data.materials[0]
+    first = head.data.materials[0]
     first.node_tree.nodes["WildCap Skin"].inputs["Roughness"].default_value = 0.31
     shown = first.node_tree.nodes[albedo].image
     open_copy(capture, copied)
@@ -100,7 +94,7 @@ def test_a_skin_that_was_linked_to_another_head_keeps_its_values_and_each_head_i
     other.data.materials[0] = first
     bpy.ops.wildcap.assemble_material()
     second = other.data.materials[0]
-    assert obj.data.materials[0] == first != second and first.node_tree.nodes[albedo].image == shown
+    assert head.data.materials[0] == first != second and first.node_tree.nodes[albedo].image == shown
     assert Path(second.node_tree.nodes[albedo].image.filepath).is_relative_to(copied)
     assert second.node_tree.nodes["WildCap Skin"].inputs["Roughness"].default_value == pytest.approx(0.31)
     bpy.ops.wildcap.assemble_material()

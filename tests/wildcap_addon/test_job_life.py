@@ -78,6 +78,7 @@ def test_jobs_of_several_faces_wait_in_line_and_one_can_leave_it(addon, jobs, tm
     jobs.cancel(roots[0])
     follow(addon)
     assert [capture.has("maps/normal.png") for capture in captures] == [False, False, True]
+    assert "Cancelled" in addon("problems").of(roots[0]).problem
 
 
 def test_a_job_goes_on_when_another_file_is_opened_and_when_everything_is_undone(addon, jobs, tmp_path):
@@ -101,25 +102,6 @@ def test_a_job_goes_on_when_another_file_is_opened_and_when_everything_is_undone
     bpy.ops.wildcap.cancel(capture=root)
     follow(addon)
     wait_for_end(pid)
-
-
-def test_a_cancelled_second_solve_is_to_be_done_though_the_maps_of_before_are_there(addon, jobs, tmp_path):
-    def state() -> str:
-        item = addon("captures").active(bpy.context)
-        addon("status").of(item)
-        addon("status").refresh(bpy.context)
-        return addon("status").of(item).stages["solve"]
-
-    capture = make(tmp_path)
-    bpy.ops.wildcap.solve()
-    follow(addon)
-    assert state() == "older", "the solver that ran is not this one's"
-    set_mood(capture, "slow")
-    solve_until_progress(addon, capture)
-    bpy.ops.wildcap.cancel()
-    follow(addon)
-    assert "Cancelled" in addon("problems").of(str(capture.root)).problem
-    assert capture.has("maps/normal.png") and state() == "to do"
 
 
 def test_a_solve_in_the_middle_of_painting_takes_the_mask_as_it_is_painted(addon, tmp_path, monkeypatch):
@@ -179,26 +161,6 @@ def test_an_interrupted_solve_is_offered_to_go_on_when_the_file_is_opened_again(
     # painted since: a checkpoint of another mask is of no use
     capture.shadow_mask.write_bytes(capture.shadow_mask_auto.read_bytes())
     assert step(addon).label == "Solve"
-
-
-def test_an_installation_is_polled_like_a_job_and_sets_the_python(addon):
-    jobs, preferences = addon("jobs"), addon("preferences")
-
-    class Installation:
-        """Says what a real one says, without a download."""
-
-        running = True
-        start = staticmethod(lambda: None)
-        messages = [jobs.messages.Progress("environment", 1, 2, "Collecting torch"), jobs.messages.Done(1.0)]
-
-        def poll(self):
-            self.running = len(self.messages) > 1
-            return [self.messages.pop(0)]
-
-    jobs.start_worker("", "install", Installation(), lambda: preferences.set_python(Path(sys.executable)))
-    assert jobs.poll() and jobs.of("").progress.text == "Collecting torch"
-    assert not jobs.poll() and preferences.python() == Path(sys.executable)
-    preferences.set_python(None)
 
 
 def test_a_timer_that_fails_tells_it_and_goes_on(addon, monkeypatch):

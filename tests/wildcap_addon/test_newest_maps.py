@@ -44,15 +44,13 @@ def is_at_4k(capture: Capture) -> bool:
     return maps[0].parent == capture.maps_4k
 
 
-@pytest.mark.parametrize("times", [(1e9, 2e9), (2e9, 1e9), (2e9, 2e9)])
-def test_maps_at_4k_that_were_made_of_the_solved_ones_are_worn_whatever_times_files_have(enlarged, times):
-    date(enlarged, *times)
-    assert is_at_4k(enlarged)
-
-
 @pytest.mark.parametrize("name", WORN)
-def test_maps_of_a_later_solve_are_worn_whatever_times_files_have(enlarged, name):
-    change(enlarged.maps / name)
+def test_the_record_tells_which_maps_are_worn_whatever_times_files_and_later_settings_have(enlarged, name):
+    assert enlarged.state(UPSCALE, from_json({"upscale": {"size": 2048}})) == "stale"
+    for times in ((1e9, 2e9), (2e9, 1e9), (2e9, 2e9)):
+        date(enlarged, *times)
+        assert is_at_4k(enlarged)
+    change(enlarged.maps / name)  # of a later solve
     date(enlarged, 1e9, 2e9)
     assert not is_at_4k(enlarged)
 
@@ -68,10 +66,6 @@ def test_maps_of_a_later_solve_are_worn_whatever_times_files_have(enlarged, name
 def test_a_folder_that_is_not_whole(enlarged, lose, at_4k):
     lose(enlarged)
     assert is_at_4k(enlarged) == at_4k
-
-
-def test_other_settings_of_the_enlarging_do_not_take_its_maps_away(enlarged):
-    assert enlarged.state(UPSCALE, from_json({"upscale": {"size": 2048}})) == "stale" and is_at_4k(enlarged)
 
 
 def test_where_no_record_tells_the_times_do(enlarged):

@@ -14,12 +14,12 @@ FINISHED = {**HEAD, **MAPS, "has_mask": True, "head": 5.0, "maps": 9.0}
 
 @pytest.fixture
 def step(addon):
-    """Facts by keyword -> the next step. `done`, `stale` and `absent` name stages; the rest are to do."""
+    """Facts by keyword -> the next step. `done`, `stale`, `older` and `absent` name stages; the rest are to do."""
     next_step, status = addon("next_step"), addon("status")
 
     def of(capture=True, python=True, head=-1.0, maps=-1.0, running="", painting=False, source="face.mp4", **known):
         stages = dict.fromkeys((*BEFORE, "solve", "upscale"), "to do")
-        for state in ("done", "stale", "absent"):
+        for state in ("done", "stale", "older", "absent"):
             stages |= dict.fromkeys(known.pop(state, ()), state)
         seen = status.Status(source=source, stages=stages, **known) if capture else None
         return next_step.next_step(next_step.Facts(capture, python, running, painting, head, maps, seen))
@@ -60,6 +60,7 @@ SAMPLE = {"source": "", "absent": ("texture", "shadow_mask", "solve"), **HEAD, *
         ("finish_mask", {"painting": True}),
         ("solve", {**FINISHED, "done": BEFORE, "stale": ("solve",)}),
         ("render", {**FINISHED, "done": (*BEFORE[1:], "solve"), "stale": ("frames",)}),  # not back to the start
+        ("render", {**FINISHED, "older": (*BEFORE, "solve")}),
         ("assemble_material", {**FINISHED, "done": (*BEFORE, "solve"), "maps_time": 12.0}),
         ("bring_in_head", {**SAMPLE, "python": False}),  # the sample head needs no solver
         ("render", {**SAMPLE, "python": False, "head": 5.0, "maps": 9.0}),

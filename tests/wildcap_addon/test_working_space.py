@@ -16,7 +16,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from tests.fixtures.acting_heads import capture_of, things  # noqa: E402
+from tests.fixtures.acting_heads import things, write_head  # noqa: E402
 from tests.fixtures.grown_hair import write_strands  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -69,9 +69,12 @@ def test_a_usual_configuration_leaves_colours_as_they_are(addon):
 
 
 @in_acescg
-def test_eyes_teeth_and_hair(close_up, addon):
-    head, acting, materials = close_up, addon("acting.materials"), addon("acting.close_up.materials")
-    strands = write_strands(capture_of(head), addon("acting.asset").load())
+def test_eyes_teeth_and_hair(addon, capture, few_units):
+    acting, materials = addon("acting.materials"), addon("acting.close_up.materials")
+    write_head(capture, 1.0)
+    for click in ("bring_in_head", "assemble_material", "add_face_units", "close_up"):
+        getattr(bpy.ops.wildcap, click)()
+    head, strands = bpy.context.view_layer.objects.active, write_strands(capture, addon("acting.asset").load())
     bpy.ops.wildcap.iris(iris='blue')
     bpy.ops.wildcap.grow_hair()
     worn = things(head)

@@ -3,16 +3,13 @@
 """Planning a batch: tables as spreadsheets write them, folders of films, rows that cannot be used, and records that are
 none."""
 
-import errno
 import json
-import os
 
 import pytest
 
 from core.__main__ import main
 from core.batch.record import read_batch
 from core.batch.shots import read_faces
-from core.capture import lease
 from core.capture.messages import Problem
 
 
@@ -84,20 +81,6 @@ def test_a_name_that_a_disk_may_take_for_another_one_is_refused(folder, capsys):
     assert [face.name for face in read_batch(batch).faces] == ["Anna", "Zo\u00eb", "carl"]
     faces, faults = plan(folder, "video,name\nanna.mp4,Zo\u00eb\nanna.avi,Zoe\u0308\n")
     assert len(faces) == 1 and "is taken by Line 2" in faults[0].problem
-
-
-@pytest.mark.parametrize("code, said", [(errno.ENOSPC, "The disk is full"), (errno.EROFS, "is read-only")])
-def test_a_batch_whose_folder_cannot_be_written_is_refused_by_name(folder, capsys, monkeypatch, code, said):
-    batch = folder / "batch"
-    assert main(["batch", "plan", str(folder), str(batch)]) == 0
-
-    def refuse(*_) -> None:
-        raise OSError(code, os.strerror(code), str(batch / "lock"))
-
-    monkeypatch.setattr(lease, "_make", refuse)
-    assert main(["batch", "run", str(batch)]) == 2
-    told = capsys.readouterr().err
-    assert said in told and str(batch) in told and "inside WildCap" not in told
 
 
 @pytest.mark.parametrize(

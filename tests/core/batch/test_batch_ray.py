@@ -29,14 +29,11 @@ from core.capture import lease
 from core.capture.hashes import hash_file
 from core.capture.messages import Problem
 from tests.fixtures import tiny_batch
+from tests.fixtures.polled_jobs import wait
+from tests.fixtures.refused import refuses
 from tests.fixtures.tiny_batch import core, finish, finished, lines, make, set_mood, states
 
 WAIT_S = 90  # for what takes seconds where nothing else is computed
-
-
-@pytest.fixture(scope="module")
-def code(tmp_path_factory):
-    return tiny_batch.build(tmp_path_factory.mktemp("tiny"))
 
 
 @pytest.fixture(scope="module")
@@ -77,13 +74,6 @@ def meanwhile(work):
     assert not errors, errors
 
 
-def wait_for(condition) -> None:
-    deadline = time.monotonic() + WAIT_S
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-
-
 def account(batch) -> list[dict]:
     """What the nodes say that they began and finished."""
     paths = (batch.root / ray_task.LOGS).glob("*.jsonl")
@@ -105,7 +95,7 @@ def test_a_killed_task_is_done_again_and_nothing_that_was_done(code, cluster, tm
     once = finished(batch)["e"]
 
     def kill() -> None:
-        wait_for(lambda: at_stage(batch, "a", "scan"))
+        wait(lambda: at_stage(batch, "a", "scan"), WAIT_S)
         set_mood(batch.face("a").capture, {})
         os.kill(at_stage(batch, "a", "scan")[0]["pid"], signal.SIGKILL)
 
@@ -134,14 +124,14 @@ def test_it_is_cancelled_within_two_seconds(code, cluster, tmp_path, way):
     captures, took = [face.capture for face in batch.faces], []
 
     def cancel() -> None:
-        wait_for(lambda: sum(any(c.root.glob(".scan*")) for c in captures) >= min(2, os.cpu_count()))
-        wait_for(lambda: local_progress(batch).get("a", {}).get("stage") == "Scan")
+        wait(lambda: sum(any(c.root.glob(".scan*")) for c in captures) >= min(2, os.cpu_count()), WAIT_S)
+        wait(lambda: local_progress(batch).get("a", {}).get("stage") == "Scan", WAIT_S)
         began = time.monotonic()
         if way == "stop":
             (batch.root / local.STOP).touch()
         else:
             os.kill(os.getpid(), signal.SIGINT)
-        wait_for(lambda: not any(lease.holder(capture.lock) for capture in captures))
+        wait(lambda: not any(lease.holder(capture.lock) for capture in captures), WAIT_S)
         took.append(time.monotonic() - began)
 
     with meanwhile(cancel):
@@ -158,8 +148,7 @@ def test_the_gate_waits_and_a_cluster_that_cannot_work_is_refused(code, cluster,
     batch = make(tmp_path, "ab", None, "--gate", "artist")
     finish(batch.face("a"), "shadow_mask")
     finish(batch.face("b"), "texture")
-    with pytest.raises(Problem, match="No node of the cluster has 1000 cores and 5 GB"):
-        ray_cluster._examine_nodes(cluster, batch, 1000)
+    refuses("No node of the cluster has 1000 cores and 5 GB", ray_cluster._examine_nodes, cluster, batch, 1000)
     with monkeypatch.context() as elsewhere, pytest.raises(Problem, match=f"{tmp_path / 'none'}. Set WILDCAP_CODE"):
         elsewhere.setattr(ray_cluster, "ROOT", tmp_path / "none")
         ray_cluster._examine_nodes(cluster, batch, 1)
@@ -247,10 +236,12 @@ def test_an_address_that_cannot_be_reached_is_told_in_seconds(code, tmp_path, ca
             _, err = process.communicate(timeout=30)  # 15 s, and what it takes to import Ray on a busy machine
         assert process.returncode == 2 and "No Ray cluster can be reached" in err and len(err.splitlines()) == 2, err
     for wrong, said in ((address, "Connection refused"), ("here", "not the address of")):
-        with pytest.raises(Problem, match=said):
-            ray_connection._reach(wrong)
-    with pytest.raises(Problem, match="could not be started on this machine: It took too long."):
-        ray_connection._begin(mock.Mock(side_effect=Exception("It took too long.\nMore of it.")))
+        refuses(said, ray_connection._reach, wrong)
+    refuses(
+        "could not be started on this machine: It took too long.",
+        ray_connection._begin,
+        mock.Mock(side_effect=Exception("It took too long.\nMore of it.")),
+    )
     monkeypatch.setitem(sys.modules, "ray", None)
     assert main(["batch", "run", str(batch.root), "--on", "ray"]) == 2
     assert "requirements/farm.txt" in capsys.readouterr().err

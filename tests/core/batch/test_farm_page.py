@@ -12,7 +12,6 @@ import sys
 from core.batch.groups import GROUPS
 from core.batch.record import read_batch
 from tests.conftest import ROOT
-from tests.fixtures import tiny_batch
 from tests.fixtures.tiny_batch import core, set_mood
 
 SBATCH = """#!{python}
@@ -27,8 +26,8 @@ with open(os.environ["SBATCH_LOG"], "a+", encoding="utf-8") as log:
 """
 
 
-def test_the_loop_for_slurm_submits_and_chains_every_task(tmp_path):
-    code, films, batch = tiny_batch.build(tmp_path / "pro gram"), tmp_path / "films", tmp_path / "bat ch"
+def test_the_loop_for_slurm_submits_and_chains_every_task(code, tmp_path):
+    films, batch = tmp_path / "films", tmp_path / "bat ch"
     films.mkdir()
     (films / "Zoë d'Arc.mp4").touch()
     assert core(code, "batch", "plan", films, batch).returncode == 0

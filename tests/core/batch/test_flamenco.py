@@ -1,16 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flamenco's job type, run by Duktape, an engine of ES5.1, against stand-ins for the functions that Flamenco documents;
-its commands, run for real.
-
-What the Manager does with variables is played by `submitted` and `sent`: in the settings, a two-way variable's path
-becomes its name; in each argument, names become the worker's values. The Manager itself is not run.
-"""
+"""Flamenco's job type, run by Duktape, an engine of ES5.1, against stand-ins for the functions that Flamenco documents.
+The Manager itself is not run."""
 
 import json
 import re
-import subprocess
-import sys
 from itertools import pairwise
 
 import dukpy
@@ -19,11 +13,8 @@ import pytest
 from core.batch.gate import accept_mask
 from core.batch.groups import GATE, GROUPS
 from core.batch.lines import PARTS
-from core.batch.record import read_batch
-from core.capture.capture import Capture
 from tests.conftest import ROOT
-from tests.fixtures import tiny_batch
-from tests.fixtures.tiny_batch import core, set_mood
+from tests.fixtures.tiny_batch import core, finish, make
 
 SCRIPT = (ROOT / "farm" / "flamenco" / "wildcap.js").read_text(encoding="utf-8")
 STAND_INS = """
@@ -49,33 +40,8 @@ def compiled(**settings) -> list[dict]:
     return dukpy.evaljs([STAND_INS, SCRIPT, "compileJob(job); made"], settings=known)
 
 
-def test_the_job_type_is_es5_and_uses_what_is_documented_alone():
-    for newer in (
-        "let a = 1;",
-        "var f = (x) => x;",
-        "var a = `b`;",
-        "for (var a of []) {}",
-        "class A {}",
-        "var {a} = {};",
-        "compileJob(job); path.join('a')",
-    ):
-        with pytest.raises(dukpy.JSRuntimeError):  # what this engine does not know would be found
-            dukpy.evaljs([STAND_INS, SCRIPT + newer], settings=GIVEN)
-    assert not re.search(r"\bconst\b", SCRIPT), "the one newer word that this engine takes"
-    compiled()
-
-
-def test_the_settings_are_what_flamenco_can_show():
-    label, settings = dukpy.evaljs([STAND_INS, SCRIPT, "[JOB_TYPE.label, JOB_TYPE.settings]"], settings={})
-    assert label and len({setting["key"] for setting in settings}) == len(settings)
-    for setting in settings:
-        assert setting["type"] == "string" and setting["description"]
-        assert set(setting) <= {"key", "type", "subtype", "required", "choices", "default", "description"}
-        assert setting.get("required", False) != ("default" in setting)
-    assert [setting["choices"] for setting in settings if "choices" in setting] == [list(PARTS)]
-
-
 def test_a_face_is_the_chain_of_the_batchs_tasks():
+    assert not re.search(r"\bconst\b", SCRIPT), "the one word newer than ES5 that this engine takes"
     made = compiled(gpu_task_type="cuda", task_type="")
     assert [task["name"] for task in made] == [f"Anna.{group.name}" for group in GROUPS]
     assert [task["type"] for task in made] == ["cuda" if group.on_device else "misc" for group in GROUPS]
@@ -131,62 +97,20 @@ def test_settings_that_make_no_sense_are_refused_with_a_sentence(settings, words
         compiled(**settings)
 
 
-def submitted(job: dict, variables: dict[str, tuple[str, str]]) -> list[dict]:
-    """The tasks of a job as the Manager keeps them; `variables` are the two-way ones: name -> the path on the
-    submitter's platform and on the worker's."""
-    settings = {}
-    for key, value in job["settings"].items():
-        for name, (here, _) in variables.items():
-            value = f"{{{name}}}{value[len(here) :]}" if value.startswith(here) else value
-        settings[key] = value
-    return compiled(**{key: None for key in GIVEN} | settings)
-
-
-def sent(argument: str, values: dict[str, str]) -> str:
-    """What the worker gets of an argument."""
-    for name, value in values.items():
-        argument = argument.replace(f"{{{name}}}", value)
-    return argument
-
-
-def test_the_commands_do_the_work_on_a_machine_that_sees_the_storage_elsewhere(tmp_path):
-    """Two faces, one of which stops and fails its own job alone, up to its mask and from there to the end."""
-    code, storage, seen = tiny_batch.build(tmp_path / "pro gram"), tmp_path / "st örage", tmp_path / "vol"
-    (storage / "films").mkdir(parents=True)
-    for name in ("Zoë d'Arc", "Anna"):
-        (storage / "films" / f"{name}.mp4").write_text(name, encoding="utf-8")
-    core(code, "batch", "plan", storage / "films", storage / "batch", "--gate", "artist")
-    for face in read_batch(storage / "batch").faces:
-        set_mood(face.capture, {"frames": "finding"} if face.name == "Anna" else {})
-    values = {"wildcap_python": sys.executable, "wildcap": str(code), "shots": str(seen)}
+def test_a_batch_is_a_job_for_each_face_up_to_its_mask_and_from_there(code, tmp_path):
+    batch = make(tmp_path, "ab", None, "--gate", "artist")
 
     def list_jobs() -> list[dict]:
-        listed = core(code, "batch", "commands", storage / "batch", "--flamenco")
+        listed = core(code, "batch", "commands", batch.root, "--flamenco")
         assert listed.returncode == 0, listed.stderr
         return [json.loads(line) for line in listed.stdout.splitlines()]
 
-    def work(job: dict) -> list[tuple[str, int]]:
-        """Does the tasks on the other machine, where the submitter's paths lead nowhere, until one fails."""
-        ended: dict[str, int] = {}
-        storage.rename(seen)
-        for task in submitted(job, {"shots": (str(storage), str(seen))}):
-            assert all(ended[other] == 0 for other in task["after"])
-            parameters = task["commands"][0]["parameters"]
-            words = [sent(word, values) for word in (parameters["exe"], *parameters["args"])]
-            done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
-            ended[task["name"]] = done.returncode
-            if done.returncode:
-                assert "The face is not there.\nFilm it." in done.stderr
-                break
-        seen.rename(storage)
-        return list(ended.items())
-
     jobs = list_jobs()
     assert [(job["type"], job["settings"]["part"]) for job in jobs] == [("wildcap", "to the masks")] * 2
-    assert work(jobs[0]) == [("Anna.head", 2)]
-    assert work(jobs[1]) == [("Zoë d'Arc.head", 0), ("Zoë d'Arc.mask", 0)]
-    accept_mask(Capture(storage / "batch" / "Zoë d'Arc.wildcap"))
-    again, job = list_jobs()
-    assert again == jobs[0] and job["settings"].items() >= {"faces": "Zoë d'Arc", "part": "from the masks"}.items()
-    assert work(job) == [("Zoë d'Arc.solve", 0), ("Zoë d'Arc.deliver", 0)]
-    assert list_jobs() == [again]
+    assert jobs[0]["settings"]["batch"] == str(batch.root)
+    finish(batch.face("a"), "shadow_mask")
+    assert list_jobs() == [jobs[1]], "its mask waits"
+    accept_mask(batch.face("a").capture)
+    job, other = list_jobs()
+    assert other == jobs[1] and job["settings"].items() >= {"faces": "a", "part": "from the masks"}.items()
+    assert [task["name"] for task in compiled(**job["settings"])] == ["a.solve", "a.deliver"]

@@ -14,10 +14,10 @@ from core.batch.record import Batch, BatchFace, write_batch
 from core.batch.state import DONE, STOPPED, TO_DO, WAITING, FaceState
 from core.capture import stages
 from core.capture.files import write_json
-from core.capture.messages import Problem
 from core.imaging import images
 from core.settings.settings import Settings
 from tests.core.capture.test_report import Page
+from tests.fixtures.refused import refuses
 
 FINDING = {"problem": "The light <changed>.", "remedy": "Lock the exposure.", "frames": ["1.jpg"]}
 
@@ -158,10 +158,8 @@ def test_what_somebody_else_has_put_in_the_pages_place_stays(batch):
     path = review.write_review(batch)[0]
     assert review.write_review(batch)[0] == path, "its own page is written anew"
     path.write_text("<html>my own notes</html>")
-    with pytest.raises(Problem, match="not a page that WildCap wrote"):
-        review.write_review(batch)
+    refuses("not a page that WildCap wrote", review.write_review, batch)
     assert path.read_text() == "<html>my own notes</html>"
     path.unlink()
     path.mkdir()
-    with pytest.raises(Problem, match="review.html"):
-        review.write_review(batch)
+    refuses("review.html", review.write_review, batch)

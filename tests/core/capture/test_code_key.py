@@ -3,7 +3,6 @@
 """The code key of a stage: exactly what it imports counts, under every Python alike, and words do not."""
 
 import ast
-import re
 import shutil
 import subprocess
 import sys
@@ -41,6 +40,11 @@ def copy(tmp_path_factory) -> Iterator[Path]:
         (copied / "weights" / path.name).write_text(path.name)
     yield copied
     forget()
+
+
+@pytest.fixture(scope="module")
+def before(copy) -> dict[str, str]:
+    return keys(copy)
 
 
 def forget() -> None:
@@ -92,32 +96,12 @@ def test_the_closure_is_all_that_a_stage_imports_however_far_away():
         ("weights/prior.safetensors", {"solve", "upscale"}),
     ],
 )
-def test_an_edit_changes_exactly_the_stages_that_depend_on_the_file(copy, file, expected):
-    before, content = keys(copy), (copy / file).read_bytes()
+def test_an_edit_changes_exactly_the_stages_that_depend_on_the_file(copy, before, file, expected):
+    content = (copy / file).read_bytes()
     (copy / file).write_bytes(content + b"\nADDED = 1\n")
     after = keys(copy)
     (copy / file).write_bytes(content)
     assert {name for name in before if before[name] != after[name]} == expected
-
-
-def test_modules_that_read_shipped_files_name_them():
-    """Whatever module of a stage speaks of weights/ or assets/ has the constant, and what it names is there."""
-    named = set()
-    for file, module in {
-        f: m for stage in stages.STAGES for f, m in code_key._closure(stage.module, CORE).items()
-    }.items():
-        paths = [
-            node.value
-            for node in ast.walk(ast.parse((CORE / file).read_text(encoding="utf-8")))
-            if isinstance(node, ast.Constant)
-            and isinstance(node.value, str)
-            and re.fullmatch(r"(weights|assets)(/\S*)?", node.value)
-        ]
-        assert bool(paths) == bool(module.data), f"{file} speaks of {paths} and names {module.data}"
-        assert all((CORE / name).exists() for name in module.data), file
-        named |= set(module.data)
-    weights = {f"weights/{path.name}" for path in (CORE / "weights").glob("*.safetensors")}
-    assert {name for name in named if name.endswith(".safetensors")} == weights
 
 
 def written(source: str) -> str:

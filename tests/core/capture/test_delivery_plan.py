@@ -16,6 +16,7 @@ from core.capture.files import write_json
 from core.capture.messages import Problem
 from core.settings.settings import DeliverSettings
 from tests.fixtures.kept_capture import contents
+from tests.fixtures.refused import refuses
 
 FILES = {"head.obj": "mesh", "textures/albedo.png": "albedo"}
 
@@ -83,8 +84,7 @@ def test_a_file_of_others_under_a_name_of_the_new_delivery_is_refused_by_name(ro
     place = deliver(root)
     (place / "textures" / "face.exr").write_text("mine")
     before, plan = contents(place), stage(root, {"textures/face.exr": "ours"})
-    with pytest.raises(Problem, match="textures/face.exr"):
-        delivery_plan.put_in_place(plan)
+    refuses("textures/face.exr", delivery_plan.put_in_place, plan)
     delivery_plan.discard(plan)
     assert contents(place) == before and list(place.parent.iterdir()) == [place]
 
@@ -94,8 +94,7 @@ def test_a_folder_that_no_delivery_made_is_refused(root):
     plan.target.mkdir(parents=True)
     delivery_plan.check_target(plan)
     (plan.target / "my notes.txt").write_text("mine")
-    with pytest.raises(Problem, match="WildCap did not deliver|not delivered by WildCap"):
-        delivery_plan.put_in_place(plan)
+    refuses("WildCap did not deliver", delivery_plan.put_in_place, plan)
     assert delivered(plan.target) == {"my notes.txt": "mine"}
 
 
@@ -156,14 +155,12 @@ def test_another_captures_delivery_is_refused_by_name_and_replaced_on_demand(tmp
     ],
 )
 def test_choices_that_do_not_go_together_are_refused(root, settings, words):
-    with pytest.raises(Problem, match=words):
-        delivery_plan.plan(Capture(root), DeliverSettings(**settings))
+    refuses(words, delivery_plan.plan, Capture(root), DeliverSettings(**settings))
 
 
 @pytest.mark.parametrize(("what", "words"), [("head", "no head"), ("scan", "no scan"), ("own_mesh", "no fitted mesh")])
 def test_a_mesh_that_is_missing_is_named(root, what, words):
-    with pytest.raises(Problem, match=words):
-        delivery_plan.needs(Capture(root), what)
+    refuses(words, delivery_plan.needs, Capture(root), what)
 
 
 def test_file_names_are_plain():

@@ -10,6 +10,7 @@ import pytest
 from core.capture.capture import Capture
 from core.capture.frame_records import FrameRecord, read_frames, write_frames
 from core.capture.messages import Problem
+from tests.fixtures.refused import refuses
 
 FULL = """{"name": "00000.jpg", "video_frame": 0, "time_s": 0.0, "source": "tête à tête.jpg", "size": [720, 960],
 "sharpness": 0.24862, "selected": true, "face_box": [257.3, 324.3, 514.2, 641.5], "face_score": 0.9965, "yaw_deg": -44.1,
@@ -84,5 +85,4 @@ def test_a_damaged_file_is_a_problem(tmp_path, text):
 def test_a_missing_file_and_one_in_another_encoding_are_problems(tmp_path, content):
     capture = capture_with(tmp_path, "")
     capture.frames_json.unlink() if content is None else capture.frames_json.write_bytes(content)
-    with pytest.raises(Problem, match="cannot be read"):
-        read_frames(capture)
+    refuses("cannot be read", read_frames, capture)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from core.capture import freshness, hashes, stages
+from core.capture import freshness, hashes
 from core.capture.capture import Capture
 from core.capture.files import write_json
 from core.capture.hashes import hash_source, same_source
@@ -20,19 +20,10 @@ from core.worker import runner
 from core.worker.job import read_job, write_job
 from tests.fixtures.recorded import CAMERAS, FRAMES, make, record, states
 
-SOLVE = stages.by_name("solve")
-
 
 @pytest.fixture
 def capture(tmp_path) -> Capture:
     return make(tmp_path / "project" / "Zoë & Åse.wildcap")
-
-
-def test_a_changed_input_makes_stale_and_is_named(capture):
-    assert states(Capture(capture.root)) == ["done", "done"]
-    (capture.frames / "a.bin").write_bytes(b"2")
-    assert states(capture) == ["done", "stale"]
-    assert capture.verdict(CAMERAS, Settings()).reason() == "frames/ changed"
 
 
 def test_what_a_system_leaves_in_a_folder_that_was_looked_into_changes_nothing(capture):
@@ -67,14 +58,6 @@ def test_what_a_setting_names_elsewhere_counts_by_what_it_holds(capture, tmp_pat
     assert states(capture, settings) == ["done", "done"]
     moved.write_text("other cameras", encoding="utf-8")
     assert capture.verdict(CAMERAS, settings).changed == ("cameras.import_from",)
-
-
-def test_older_code_is_a_state_of_its_own_and_a_changed_input_weighs_more(capture, monkeypatch):
-    monkeypatch.setattr(freshness, "code_key", lambda module: "another version's")
-    assert states(capture) == ["older", "older"]
-    assert capture.verdict(CAMERAS, Settings()).reason() == "made by older code (WildCap 0.2.0)"
-    (capture.frames / "a.bin").write_bytes(b"2")
-    assert states(capture) == ["older", "stale"]
 
 
 # -- the source

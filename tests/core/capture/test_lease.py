@@ -20,7 +20,7 @@ from core.capture.messages import CancelledError, Problem
 from core.worker.job import wait_until_free, write_job
 from tests.fixtures.kept_capture import NO_PROCESS, fork, make, needs_fork
 
-RACES = int(os.environ.get("WILDCAP_RACES", 60))
+RACES = int(os.environ.get("WILDCAP_RACES", 20))
 
 
 @pytest.fixture

@@ -46,16 +46,6 @@ def test_what_is_no_message_is_refused(line):
         from_line(line)
 
 
-def test_the_time_left_follows_the_pace_since_the_first_finished_unit():
-    now, sent = [100.0], []
-    report = Reporter("scan", sent.append, clock=lambda: now[0])
-    for now[0], done in ((100.0, 0), (160.0, 4), (164.0, 6)):  # four units come from a checkpoint: no work of this run
-        report.progress(done, 10, "fusing")
-    assert sent == [
-        Progress("scan", float(done), 10.0, "fusing", eta) for done, eta in ((0, None), (4, None), (6, 8.0))
-    ]
-
-
 def test_each_part_of_a_stage_has_a_pace_of_its_own():
     """As the stage of cameras reports: 24 faces in 12 s, then a structure in 120 s, then three rounds of 1 s."""
     now, sent = [0.0], []

@@ -4,8 +4,6 @@
 killed writer left goes."""
 
 import os
-import signal
-import time
 from pathlib import Path
 
 import pytest
@@ -15,7 +13,7 @@ from core.capture.files import remove_file, replacing, replacing_folder, write_j
 from core.capture.messages import Log, Problem
 from core.worker import runner
 from core.worker.job import write_job
-from tests.fixtures.kept_capture import contents, fork, kill_at_rename, make, make_frames, needs_fork
+from tests.fixtures.kept_capture import contents, kill_at_rename, make, make_frames, needs_fork
 
 
 @pytest.fixture
@@ -169,27 +167,12 @@ def test_temporary_files_in_use_and_those_of_others_are_never_cleared_away(captu
     assert (capture.root / "slow.txt").exists() and (capture.root / ".mine.123.tmp.txt").exists()
 
 
-@needs_fork
-def test_the_workspace_of_a_stage_goes_with_its_process(capture):
+def test_the_workspace_of_a_stage_goes_with_it(capture):
     with capture.workspace() as work:
         assert work.is_relative_to(capture.root) and work.is_dir()
+        with capture.locked():
+            assert work.exists(), "in use"
     assert not work.exists()
-    reading, writing = os.pipe()
-
-    def dwell():
-        with capture.workspace() as work:
-            (work / "database.db").write_text("half")
-            os.write(writing, str(work).encode())
-            time.sleep(60)
-
-    other = fork(dwell)
-    left = Path(os.read(reading, 1000).decode())
-    with capture.locked():
-        assert left.exists(), "in use"
-    os.kill(other, signal.SIGKILL)
-    os.waitpid(other, 0)
-    with capture.locked():
-        assert not left.exists()
 
 
 # -- what runs log

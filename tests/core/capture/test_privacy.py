@@ -20,6 +20,7 @@ from core.worker import client, environment, terminal
 from core.worker.background import BackgroundTask
 from core.worker.job import write_job
 from tests.fixtures import recorded
+from tests.fixtures.refused import refuses
 
 KEY = "sk-Zoe-4711-do-not-tell"
 SCRIPT = '"><script>alert(1)</script>'
@@ -83,8 +84,7 @@ def test_a_python_that_is_asked_and_a_blender_that_renders_do_not_inherit_the_ke
     blender, capture = tmp_path / "blender", Capture(tmp_path / "a.wildcap")
     blender.write_text("#!/bin/sh\nenv\n")
     blender.chmod(0o755)
-    with pytest.raises(Problem, match="no contact sheet"):
-        task._render_sheet(str(blender), capture, lambda message: None, lambda: False)
+    refuses("no contact sheet", task._render_sheet, str(blender), capture, lambda message: None, lambda: False)
     told = (capture.logs / "contact_sheet.log").read_text()
     assert "PATH=" in told and KEY not in told
 
@@ -106,5 +106,4 @@ def test_a_frame_that_changed_after_it_was_agreed_to_is_not_sent(tmp_path):
     before = frame.stat()
     frame.write_bytes(b"as it is now...")
     os.utime(frame, ns=(before.st_atime_ns, before.st_mtime_ns))
-    with pytest.raises(Problem, match="00000.jpg changed after you agreed"):
-        pack_frame(capture, "00000.jpg", plan.frames["00000.jpg"], False)
+    refuses("00000.jpg changed after you agreed", pack_frame, capture, "00000.jpg", plan.frames["00000.jpg"], False)

@@ -18,6 +18,7 @@ from core.stages.solve import prior_files
 from core.stages.upscale import enlarge, whole_head
 from core.worker import doctor
 from research.training import manifest
+from tests.fixtures.refused import refuses
 
 network = importlib.import_module("core.stages.delight.network")  # the room has a function of that name
 
@@ -83,21 +84,18 @@ def test_damaged_weights_are_named_by_what_needs_them(core, monkeypatch, module,
     path = rewrite(core / "weights" / f"{name}.safetensors", lambda content: content[:100_000])
     for constant in ("WEIGHTS", "MEAN_FACE"):
         monkeypatch.setattr(module, constant, path, raising=False)
-    with pytest.raises(Problem, match=f"{path.name} is damaged"):
-        load(path)
+    refuses(f"{path.name} is damaged", load, path)
 
 
 def test_a_damaged_head_is_named(core, monkeypatch):
     monkeypatch.setattr(template, "ASSETS", core / "assets")
     rewrite(core / "assets" / "head.obj")
-    with pytest.raises(Problem, match="head.obj is damaged"):
-        template.load.__wrapped__()
+    refuses("head.obj is damaged", template.load.__wrapped__)
 
 
 def test_damaged_face_nets_are_named(core):
     path = rewrite(core / faces.DATA_FILES[1])
-    with pytest.raises(Problem, match="is damaged"):
-        faces._net.__wrapped__(path)
+    refuses("is damaged", faces._net.__wrapped__, path)
 
 
 def test_the_doctor_names_a_cut_network(monkeypatch, capsys, tmp_path):

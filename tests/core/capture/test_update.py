@@ -85,15 +85,7 @@ def test_a_setting_that_a_stage_has_got_since_makes_nothing_stale(finished, stag
     ("changed", "told"),
     [
         ({"frames": {"mirrored": False}}, {"frames": ("frames.mirrored",)}),
-        ({"cameras": {"interpupillary_mm": 63.0}}, {"cameras": ("cameras.interpupillary_mm",)}),
-        ({"scan": {"pairs": 48}}, {"scan": ("scan.pairs",)}),
         ({"registration": {"template": ""}}, {"registration": (TEMPLATE,)}),
-        ({"delight": {"delighter": "none"}}, {"delight": ("delight.delighter",)}),
-        ({"texture": {"size": 2048}}, {"texture": ("texture.size",)}),
-        ({"shadow_mask": {"dilate_px": 4}}, {"shadow_mask": ("shadow_mask.dilate_px",)}),
-        ({"solve": {"skin_tone": "auto"}}, {"solve": ("solve.skin_tone",)}),
-        ({"upscale": {"hair": False}}, {"upscale": ("upscale.hair",)}),
-        ({"transfer": {"size": 2048}}, {"transfer": ("transfer.size",)}),
         ({"seed": 4}, dict.fromkeys((stage.name for stage in FINISHED if "seed" in stage.shared), ("seed",))),
         ({"solve": {"low_memory": True, "checkpoint_every": 9}}, {}),
     ],
@@ -101,16 +93,3 @@ def test_a_setting_that_a_stage_has_got_since_makes_nothing_stale(finished, stag
 )
 def test_a_setting_that_changed_is_told(finished, changed, told):
     assert stale(finished, made_with(finished, **changed)) == told
-
-
-def test_an_input_that_changed_is_told(finished):
-    beside = finished.root.parent
-    finished.shadow_mask.write_bytes(b"painted since")
-    assert stale(finished, made_with(finished)) == {"solve": ("shadow_mask.png",)}
-    (beside / "my head.obj").write_bytes(b"another head")
-    (beside / "film.mp4").write_bytes(b"A FILM")  # as long as the other
-    told = {"frames": (SOURCE,), "registration": (TEMPLATE,), "solve": ("shadow_mask.png",)}
-    assert stale(finished, made_with(finished)) == told
-    for name in ("film.mp4", "my head.obj"):
-        (beside / name).unlink()
-    assert stale(finished, made_with(finished)) == {"solve": ("shadow_mask.png",)}, "what is gone tells no change"

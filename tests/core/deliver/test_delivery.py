@@ -23,7 +23,6 @@ from core.capture.messages import Cancelled, Done, Failed
 from core.face import template
 from core.geometry import meshes
 from core.imaging import images
-from core.settings import delivery_presets
 from core.settings.settings import DeliverSettings, Settings
 from tests.conftest import ROOT
 from tests.fixtures import delivered
@@ -267,15 +266,6 @@ def test_what_was_delivered_before_survives_a_full_disk_and_a_cancel(capture, mo
 def test_what_cannot_be_delivered_is_refused_with_a_remedy(shared, settings, words):
     ended = delivered.deliver(shared, **settings)
     assert isinstance(ended, Failed) and words in ended.problem and ended.remedy
-
-
-def test_every_preset_has_an_albedo_that_is_linked_and_names_of_its_own():
-    for preset in delivery_presets.PRESETS.values():
-        first = preset.maps[0]
-        assert preset.format in delivery_presets.FORMATS
-        assert (first.slot, first.kind) == ("base_color", delivery_presets.COLOUR)
-        pictures = (*preset.maps, *delivery_presets.HAIR)
-        assert len({picture.name for picture in pictures}) == len(pictures)
 
 
 def test_the_guide_has_the_tables_as_they_are(capsys):

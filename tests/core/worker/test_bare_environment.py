@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from core.capture.messages import Problem
 from core.worker import bare_environment, environment, pip_source
+from tests.fixtures.refused import refuses
 from tests.fixtures.tiny_packages import write_lock, write_wheel
 
 PIP = "pip-0.1-py3-none-any.whl"
@@ -67,26 +67,22 @@ def test_an_environment_is_made_anew_by_hand_where_python_lacks_venv(tmp_path, w
 
 def test_a_python_that_nothing_can_be_made_from_is_named(tmp_path, wheels):
     folder = tmp_path / "env"
-    with pytest.raises(Problem, match="is not a working Python"):
-        make(folder, tmp_path / "none", run_stripped)
-    with pytest.raises(Problem, match="No environment can be made from .* does not start"):
-        make(folder, tmp_path / "none", lambda command: (0, ""))
-    with pytest.raises(Problem, match="does not answer"):
-        bare_environment.unpack_pip(folder, b"")
+    refuses("is not a working Python", make, folder, tmp_path / "none", run_stripped)
+    refuses(
+        "No environment can be made from .* does not start", make, folder, tmp_path / "none", lambda command: (0, "")
+    )
+    refuses("does not answer", bare_environment.unpack_pip, folder, b"")
     write_lock(tmp_path / "requirements", write_wheel(wheels, "pip", "0.1", "raise ImportError"), name="pip")
-    with pytest.raises(Problem, match="pip does not work in"):
-        make(folder)
+    refuses("pip does not work in", make, folder)
 
 
 def test_pip_is_checked_and_missed_by_name(tmp_path, wheels):
     requirements = tmp_path / "requirements"
     assert pip_source.fetch(requirements, wheels) == (wheels / PIP).read_bytes()
     (wheels / PIP).write_bytes(b"another")
-    with pytest.raises(Problem, match="hash"):
-        pip_source.fetch(requirements, wheels)
+    refuses("hash", pip_source.fetch, requirements, wheels)
     (wheels / PIP).unlink()
-    with pytest.raises(Problem, match=f"{PIP} is not in"):
-        pip_source.fetch(requirements, wheels)
+    refuses(f"{PIP} is not in", pip_source.fetch, requirements, wheels)
 
 
 def test_pip_comes_from_the_mirror_that_pip_is_set_up_for(tmp_path, wheels, unset, monkeypatch):
@@ -103,12 +99,10 @@ def test_pip_comes_from_the_mirror_that_pip_is_set_up_for(tmp_path, wheels, unse
         in (tmp_path / "requirements" / "locks" / "pip.txt").read_text()
     )
     (pages / "index.html").write_text("")
-    with pytest.raises(Problem, match=f"The package index has no {PIP}"):
-        pip_source.fetch(tmp_path / "requirements")
+    refuses(f"The package index has no {PIP}", pip_source.fetch, tmp_path / "requirements")
     server.shutdown()
     server.server_close()
-    with pytest.raises(Problem, match="pip could not be downloaded"):
-        pip_source.fetch(tmp_path / "requirements")
+    refuses("pip could not be downloaded", pip_source.fetch, tmp_path / "requirements")
 
 
 def test_pips_settings_are_read_as_pip_reads_them(tmp_path, unset, monkeypatch):

@@ -13,10 +13,11 @@ import pytest
 from core.capture import stages
 from core.capture.capture import Capture
 from core.capture.files import storage_problem
-from core.capture.messages import Done, Failed, Log, Problem
+from core.capture.messages import Done, Failed
 from core.capture.report import findings
 from core.worker import runner
 from core.worker.job import read_job, write_job
+from tests.fixtures.refused import refuses
 from tests.fixtures.tiny_chain import contents, finished, run_here, tiny_room
 
 
@@ -90,24 +91,6 @@ def test_a_write_that_fails_is_named_by_the_file_it_was_for(tmp_path, code, word
     assert problem.problem == storage_problem(OSError(code, os.strerror(code)), path).problem
 
 
-def test_what_libraries_print_goes_to_the_log_and_not_into_the_protocol(capture, video):
-    messages = run_here(capture, {"frames": "print"}, source=video, last="frames")
-    assert isinstance(messages[-1], Done) and not any(isinstance(m, Log) for m in messages)
-    log = (capture.logs / "frames.log").read_text(encoding="utf-8")
-    assert "{raw bytes" in log
-
-
-def test_a_capture_that_is_worked_on_is_refused_and_its_job_stays(capture, video):
-    job = write_job(capture, source=video)
-    before = job.read_bytes()
-    with capture.locked():
-        with pytest.raises(Problem, match=f"process {os.getpid()}"):
-            write_job(capture)
-        final = runner.run_job(job)
-        assert isinstance(final, Failed) and f"process {os.getpid()}" in final.problem
-    assert job.read_bytes() == before
-
-
 def test_a_video_that_is_gone_is_missed_only_until_its_frames_are_taken(capture, video):
     assert run_here(capture)[-1].problem == "This capture has no video yet."
     aside = video.with_suffix(".aside")
@@ -142,13 +125,11 @@ def test_jobs_that_cannot_be_are_refused(capture, video):
         ({"first": "solve", "last": "frames"}, "comes after"),
         ({"tool": "lunch"}, "'lunch'"),
     ):
-        with pytest.raises(Problem, match=words):
-            write_job(capture, source=video, **job)
+        refuses(words, write_job, capture, source=video, **job)
     for text, words in (
         ("{", "cannot be read"),
         (json.dumps({"capture": ".", "settings": {"registration": -1}}), "cannot be used: .* registration"),
     ):
         capture.job.write_text(text, encoding="utf-8")
-        with pytest.raises(Problem, match=words):
-            read_job(capture.job)
+        refuses(words, read_job, capture.job)
         assert isinstance(runner.run_job(capture.job), Failed)

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from core.__main__ import main
-from core.capture.messages import Problem
 from core.worker import environment, setup_commands, wheels
+from tests.fixtures.refused import refuses
 from tests.fixtures.tiny_packages import HERE, write_lock, write_wheel
 
 
@@ -54,5 +54,13 @@ def test_what_keeps_wheels_from_coming_is_said(index, tmp_path, capsys):
     assert main(["wheels", str(tmp_path / "wheels"), "--for", "macosx_arm64-3.13", "--compute", "cuda"]) == 2
     assert "no solver for cuda on macosx_arm64-3.13" in capsys.readouterr().err
     (tmp_path / "file").touch()
-    with pytest.raises(Problem, match="is not a folder"):
-        wheels.download(setup_commands.REQUIREMENTS, HERE, "cpu", "pip", tmp_path / "file", lambda command: (0, ""))
+    refuses(
+        "is not a folder",
+        wheels.download,
+        setup_commands.REQUIREMENTS,
+        HERE,
+        "cpu",
+        "pip",
+        tmp_path / "file",
+        lambda command: (0, ""),
+    )

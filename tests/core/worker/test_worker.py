@@ -5,6 +5,7 @@ finished. test_runner.py has how jobs end within the process."""
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -14,19 +15,13 @@ import pytest
 
 from core.capture import stages
 from core.capture.capture import Capture
-from core.capture.messages import Cancelled, Done, Failed, Problem, Progress
+from core.capture.messages import Cancelled, Done, Failed, Progress
 from core.worker import client
 from core.worker.__main__ import NICE_VALUE
 from core.worker.client import GRACE_S, Worker
 from tests.fixtures import tiny_chain
+from tests.fixtures.refused import refuses
 from tests.fixtures.tiny_chain import contents, finished, follow, start
-
-
-@pytest.fixture(scope="module")
-def root(tmp_path_factory) -> Path:
-    root = tiny_chain.build(tmp_path_factory.mktemp("Erweiterung für mich"))
-    tiny_chain.set_nice(root, 0)
-    return root
 
 
 @pytest.fixture
@@ -49,11 +44,11 @@ def leftovers(capture: Capture) -> list[Path]:
     return [*capture.root.rglob(".*"), *[capture.lock] * capture.lock.exists()]
 
 
-def test_killed_in_a_stage_the_chain_loses_that_stage_at_most(root, capture, video, tmp_path):
+def test_killed_in_a_stage_the_chain_loses_that_stage_at_most(tiny_code, capture, video, tmp_path):
     killed = "frames", "registration", "texture", "solve"  # a folder, a file, several files, several files in a folder
     skipped: dict[str, bool] = {}
     for name in killed:
-        worker = start(root, capture, {name: "slow"}, source=video)
+        worker = start(tiny_code, capture, {name: "slow"}, source=video)
         messages = follow(worker, until=half_written)
         skipped = {done: done in skipped for done in stages.NAMES[: stages.NAMES.index(name)]}
         assert finished(messages) == skipped, name
@@ -61,26 +56,27 @@ def test_killed_in_a_stage_the_chain_loses_that_stage_at_most(root, capture, vid
         final = follow(worker)[-1]
         assert isinstance(final, Failed) and final.stage == name
         assert "killed from outside" in final.problem and str(capture.logs) in final.remedy
-    assert isinstance(follow(start(root, capture))[-1], Done) and not leftovers(capture)
+    assert isinstance(follow(start(tiny_code, capture))[-1], Done) and not leftovers(capture)
     unharmed = Capture(tmp_path / "unharmed.wildcap")
-    follow(start(root, unharmed, source=video))
+    follow(start(tiny_code, unharmed, source=video))
     assert contents(capture) == contents(unharmed)
 
 
 @pytest.mark.parametrize(("mood", "limit_s"), [("slow", 1.0), ("deaf", 2.0)])
-def test_cancel_ends_within_two_seconds(root, capture, video, mood, limit_s):
-    worker = start(root, capture, {"cameras": mood}, source=video)
+def test_cancel_ends_within_two_seconds(tiny_code, capture, video, mood, limit_s):
+    worker = start(tiny_code, capture, {"cameras": mood}, source=video)
     follow(worker, until=lambda m: isinstance(m, Progress) and m.stage == "cameras" and m.done == 3)
     time.sleep(0.05)
     began = time.monotonic()
     worker.cancel()
     assert follow(worker)[-1] == Cancelled("cameras")
     assert time.monotonic() - began < limit_s and (mood == "slow" or time.monotonic() - began > GRACE_S)
-    assert finished(follow(start(root, capture, last="cameras"))) == {"frames": True, "cameras": False}
+    assert finished(follow(start(tiny_code, capture, last="cameras"))) == {"frames": True, "cameras": False}
     assert not leftovers(capture)
 
 
-def test_a_worker_steps_back_never_holds_its_starter_up_and_ends_with_it(root, capture, video):
+def test_a_worker_steps_back_never_holds_its_starter_up_and_ends_with_it(tiny_code, capture, video, tmp_path):
+    root = shutil.copytree(tiny_code, tmp_path / "code")
     tiny_chain.set_nice(root, NICE_VALUE)
     worker = start(root, capture, {"frames": "deaf"}, source=video)
     began = time.monotonic()
@@ -100,7 +96,6 @@ def test_a_worker_steps_back_never_holds_its_starter_up_and_ends_with_it(root, c
         }
     worker._process.stdin.close()
     assert worker._process.wait(timeout=5) == 3
-    tiny_chain.set_nice(root, 0)
 
 
 def test_threads_leave_a_core_free_unless_the_user_has_set_them(monkeypatch):
@@ -114,29 +109,31 @@ def test_threads_leave_a_core_free_unless_the_user_has_set_them(monkeypatch):
     assert client._environment({"OMP_NUM_THREADS": "4"})["OMP_NUM_THREADS"] == "4"
 
 
-def test_a_worker_that_dies_or_is_terminated_says_where(root, capture, video):
-    worker = start(root, capture, {"scan": "die"}, source=video)
+def test_a_worker_that_dies_or_is_terminated_says_where(tiny_code, capture, video):
+    worker = start(tiny_code, capture, {"scan": "die"}, source=video)
     final = follow(worker)[-1]
     assert isinstance(final, Failed) and final.stage == "scan" and "scan" in final.problem and "code 9" in final.problem
     assert worker.died and str(capture.logs / "scan.log") in final.remedy
-    worker = start(root, capture, {"scan": "slow"})
+    worker = start(tiny_code, capture, {"scan": "slow"})
     follow(worker, until=half_written)
     worker.terminate()
     assert follow(worker)[-1] == Cancelled("scan") and not worker.died
 
 
-def test_a_python_that_is_none_is_told(root, capture):
-    with pytest.raises(Problem, match="could not be started"):
-        Worker(capture.root / "no python", root, capture.job, capture.logs / "worker.log").start()
+def test_a_python_that_is_none_is_told(tiny_code, capture):
+    refuses(
+        "could not be started",
+        Worker(capture.root / "no python", tiny_code, capture.job, capture.logs / "worker.log").start,
+    )
 
 
-def test_only_protocol_lines_leave_by_stdout(root, capture, video):
+def test_only_protocol_lines_leave_by_stdout(tiny_code, capture, video):
     """Without the client: every line of the real stdout is a message, and stdin's end ends the worker."""
     tiny_chain.set_mood(capture, {"frames": "print"})
     job = tiny_chain.write_job(capture, source=video, last="frames")
     with subprocess.Popen(
         [sys.executable, "-E", "-s", "-B", "-m", "core.worker", str(job)],
-        cwd=root,
+        cwd=tiny_code,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
@@ -144,4 +141,5 @@ def test_only_protocol_lines_leave_by_stdout(root, capture, video):
     ) as process:
         lines = process.stdout.read().splitlines()
     assert [json.loads(line)["kind"] for line in lines][-2:] == ["StageDone", "Done"]
-    assert "a library talks" in (capture.logs / "frames.log").read_text(encoding="utf-8")
+    log = (capture.logs / "frames.log").read_text(encoding="utf-8")
+    assert "a library talks" in log and "{raw bytes" in log

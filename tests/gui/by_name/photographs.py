@@ -19,35 +19,16 @@ PHOTOGRAPHS = Path(__file__).resolve().parents[1] / "photographs"
 def flow():
     yield from d.open_tab("WildCap")
     addon.use_solver()
-    root = yield from drop(Path.home() / "Documents" / "face")
-    quick()
+    folder = Path.home() / "Documents" / "face"
+    shutil.copytree(PHOTOGRAPHS, folder)
+    yield from addon.drop(folder, *sorted(path.name for path in folder.iterdir()))
+    own_head.quick(addon.settings())
+    bpy.context.scene.wildcap.resolution, bpy.context.scene.wildcap.samples = 512, 16
+    root = Path(addon.module("captures").root(addon.settings()))
     yield from own_head.make(root)
     yield from own_head.lit_face(root)
     looks_back()
     d.screenshot("photographs_3_rendered")
-
-
-def drop(folder: Path):
-    """All photographs dropped at once on the tab, by the operator that Blender calls for it; returns the capture's
-    folder."""
-    shutil.copytree(PHOTOGRAPHS, folder)
-    d.act()
-    with d.in_view('UI'):
-        bpy.ops.wm.drop_import_file(
-            'INVOKE_DEFAULT', directory=str(folder), files=[{"name": path.name} for path in sorted(folder.iterdir())]
-        )
-    yield 1.0
-    d.screenshot("photographs_1_drop_menu")
-    yield from d.key('C')  # Blender asks: a reference, or Choose Video
-    yield from d.until(lambda: len(bpy.context.scene.wildcap.captures) == 1, "one capture of all the photographs", 10)
-    yield 1.0
-    d.screenshot("photographs_2_dropped")
-    return Path(addon.module("captures").root(addon.settings()))
-
-
-def quick() -> None:
-    own_head.quick(addon.settings())
-    bpy.context.scene.wildcap.resolution, bpy.context.scene.wildcap.samples = 512, 16
 
 
 def looks_back() -> None:

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Face units by clicks: added in the panel, lids and jaw opened, back by Rest; hair grown, taken back by Ctrl-Z, and
-grown again; eyes and mouth for a close-up, and a render of all of it."""
+"""Face units added by a click, hair grown, eyes and mouth for a close-up, and a render of all of it."""
 
 from pathlib import Path
 
@@ -22,21 +21,6 @@ def flow():
     yield from d.press("wildcap.add_face_units")
     yield from d.until(lambda: keys() is not None and len(keys().key_blocks) == 57, "the face units", 60)
     yield from d.scroll(END)
-    d.screenshot("acting_closed")
-    keys()["eyesOpen"], keys().key_blocks["jawOpen"].value = 1.0, 0.6
-    keys().update_tag()
-    yield 2.0
-    assert keys().key_blocks["eyesOpenLeft"].value > 0.99, "the slider does not open the lids"
-    d.screenshot("acting_open")
-    yield from d.press("wildcap.rest_face")
-    yield from d.until(
-        lambda: keys().key_blocks["jawOpen"].value == 0 and keys()["eyesOpen"] == 0, "the face at rest", 20
-    )
-    d.say(f"{len(keys().key_blocks) - 1} units")
-    yield from grow_hair()
-    yield from d.move(d.middle())
-    yield from d.key('Z', ctrl=True)
-    yield from d.until(lambda: not hair(), "the head without hair again", 20)
     yield from grow_hair()
     d.screenshot("acting_hair")
     d.say(", ".join(f"{len(thing.data.curves)} {thing.name}" for thing in hair()))

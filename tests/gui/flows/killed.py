@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender that is killed, or closed, while its solver runs and its mask is painted: no stroke is lost, no worker
-outlives it, and another Blender goes on."""
+"""A Blender that is killed, or closed, while its solver runs and its mask is painted: no stroke is lost, and no
+worker outlives it."""
 
 import tempfile
 import time
@@ -29,7 +29,6 @@ def flow():
     addon.draft(steps=600, checkpoint_every=1)
     yield from killed_after_a_stroke(root, folder / "stroke")
     yield from closed_after_a_stroke(root, folder / "quit")
-    yield from killed_while_solving(root, folder / "solve")
 
 
 def killed_after_a_stroke(root: Path, folder: Path):
@@ -56,22 +55,6 @@ def closed_after_a_stroke(root: Path, folder: Path):
         f"a solve anew, of the mask with the stroke, instead of {addon.next_step()}",
         10,
     )
-
-
-def killed_while_solving(root: Path, folder: Path):
-    """The first Blender sees what is left, offers to continue, and does."""
-    (root / "checkpoints" / "solve.safetensors").unlink(missing_ok=True)  # of the mask before the last stroke
-    blender = second.start("solve", folder)
-    told = yield from second.heard(blender, folder, "checkpoint", addon.START_LIMIT_S)
-    blender.kill()
-    yield from ended(told["worker"])
-    yield 1.5
-    yield from d.park()
-    d.screenshot("killed_2_continue")
-    yield from addon.continued(root)
-    process = addon.worker_process(root)
-    yield from d.lead("wildcap.cancel")
-    yield from d.until(lambda: process.poll() is not None, "the end", 5)
 
 
 def ended(pid: int):

@@ -1,35 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A painting session's ends, in the window: leaving gives the artist's things back, a file saved in the middle goes on,
-and six seconds after a stroke it is on the disk, where another Blender finds it."""
-
-import shutil
-import subprocess
-import tempfile
-from pathlib import Path
+"""Leaving a painting session in the window gives the artist's things back."""
 
 import addon
 import bpy
 import driver as d
-import numpy as np
 import painting
-
-FIND = """
-import bpy, sys
-import numpy as np
-image = bpy.data.images.load(sys.argv[-1])
-image.colorspace_settings.name = 'Non-Color'
-np.save(sys.argv[-1] + '.npy', np.flipud(np.array(image.pixels[:], np.float32).reshape(image.size[1], image.size[0], -1)[..., 0]))
-"""
 
 
 def flow():
-    root = yield from addon.open_sample_head()
+    yield from addon.open_sample_head()
     own_things()
-    for mode, protect in (('SCULPT', False), ('WEIGHT_PAINT', False), ('TEXTURE_PAINT', True)):
+    for mode, protect in (('SCULPT', False), ('TEXTURE_PAINT', True)):
         yield from leave(mode, protect)
-    yield from reopen()
-    yield from killed(root)
 
 
 def own_things() -> None:
@@ -123,45 +106,3 @@ def plain(thing) -> dict:
                 tuple(value) if getattr(each, "is_array", False) else sorted(value) if isinstance(value, set) else value
             )
     return found
-
-
-def reopen():
-    """Saved while painting, opened again: the brush is in hand, and a stroke still reaches the capture."""
-    blend = Path(tempfile.mkdtemp()) / "middle.blend"
-    bpy.ops.wildcap.paint_mask()
-    yield 1.0
-    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
-    painted = painting.mask()
-    bpy.ops.wm.open_mainfile(filepath=str(blend))
-    yield 2.0
-    assert bpy.context.mode == 'PAINT_TEXTURE' and np.abs(painting.mask() - painted).max() < 0.01
-    yield from d.open_tab("WildCap")
-    x, y = d.middle()
-    yield from painting.visible_dab(x - 30, y - 50)  # the mask brush is still in hand
-    yield from d.park()
-    d.screenshot("painting_goes_on")
-    yield from d.lead("wildcap.finish_mask")
-    yield 1.0
-    assert bpy.context.mode == 'OBJECT' and not any("WildCap" in brush.name for brush in bpy.data.brushes)
-    d.say("went on after opening the file")
-
-
-def killed(root: Path):
-    """What the disk holds six seconds after a stroke is all that would be left if Blender were killed now: another
-    Blender reads it."""
-    bpy.ops.wildcap.paint_mask()
-    yield from painting.in_hand()
-    x, y = d.middle()
-    yield from painting.visible_dab(x - 50, y + 60)
-    yield 6.0
-    found = Path(tempfile.mkdtemp()) / "found.png"
-    shutil.copyfile(root / "shadow_mask.png", found)
-    (found.parent / "find.py").write_text(FIND)
-    subprocess.run(
-        ["blender", "-b", "--factory-startup", "-P", str(found.parent / "find.py"), "--", str(found)],
-        check=True,
-        timeout=120,
-        capture_output=True,
-    )
-    assert np.abs(np.load(f"{found}.npy") - painting.mask()).max() < 0.01
-    d.say("six seconds after a stroke another Blender finds it")

@@ -24,13 +24,13 @@ CHEEK = Vector((0.3, -1.0, -0.1))
 """Where the person's left cheek is, right on the screen, seen from the middle of the head."""
 SHADOW, RADIUS = 0.4, 0.045
 """What is left of the light in a shadow cast on that cheek, and its radius in UV: the brush is wider."""
+LIMIT_S = 1700
 SHADE = """
 import sys
 import numpy as np
 from pathlib import Path
 from core.imaging import images
 
-LIMIT_S = 1700
 root, u, v, radius, left = Path(sys.argv[1]), *map(float, sys.argv[2:])
 texture = images.read_linear(root / "texture.exr")
 rows, columns = np.mgrid[:len(texture), :len(texture)] + 0.5
@@ -42,28 +42,14 @@ images.write_srgb(root / "texture.png", images.linear_to_srgb(texture))
 
 
 def flow():
-    root = yield from open_sample_head()
+    yield from d.open_tab("WildCap")
+    d.screenshot("1_new")
+    root = yield from addon.open_sample_head()
     shade(root)
     yield from paint(root)
     yield from solve(root)
     lit_as_painted(root)
     yield from relight(root)
-
-
-def open_sample_head():
-    """From an empty profile to a head that can be relit, within ten seconds."""
-    yield from d.open_tab("WildCap")
-    d.screenshot("1_new")
-    position = yield from d.find("wildcap.open_sample_head")
-    started = time.monotonic()
-    yield from d.click(position)
-    yield from d.until(lambda: head() is not None, "the sample head", 10)
-    d.say(f"Sample head after {time.monotonic() - started:.1f} s")
-    assert "WildCap Skin" in head().data.materials[0].node_tree.nodes
-    yield from d.park()
-    yield 1.5
-    d.screenshot("2_sample_head")
-    return Path(head()["wildcap_capture"])
 
 
 def shade(root: Path) -> None:

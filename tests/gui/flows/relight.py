@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Relight panel, wide and narrow; contact sheet and turntable by their buttons, from a terminal, and a render
-stopped by Esc."""
+"""Contact sheet and turntable by their buttons, a picture from a terminal, and a render stopped by Esc."""
 
 import ctypes
 import subprocess
@@ -11,9 +10,6 @@ import addon
 import bpy
 import driver as d
 
-OUTLINE_PX = 8
-"""How far inside of its region the sidebar's outline lies, which the mouse drags"""
-NARROWER_PX = 90
 ESCAPE = 0xFF1B
 """X11's symbol of the key"""
 
@@ -21,30 +17,15 @@ ESCAPE = 0xFF1B
 def flow():
     addon.unfold("WILDCAP_PT_relight")
     root = yield from addon.open_sample_head()
-    yield from panel()
+    x, y = yield from d.find("wildcap.render")
+    yield from d.click((x - 20, y - 24))
+    props = bpy.context.scene.wildcap
+    props.light, props.resolution, props.samples = 'three_point', 64, 2
+    yield from d.scroll(16)
     yield from contact_sheet(root)
     yield from turntable(root)
     from_a_terminal(root)
     yield from stopped(root)
-
-
-def panel():
-    yield 0.5
-    d.screenshot("relight_wide")
-    props = bpy.context.scene.wildcap
-    x, y = yield from d.find("wildcap.render")
-    yield from d.click((x - 20, y - 24))
-    props.light = 'hdri'
-    yield from d.scroll(8)
-    d.screenshot("relight_turntable_hdri")
-    sidebar = d.region('UI')
-    width, (x, y) = sidebar.width, (sidebar.x + OUTLINE_PX, sidebar.y + sidebar.height / 2)
-    yield from d.stroke([(x + NARROWER_PX * i / 15, y) for i in range(16)])
-    assert d.region('UI').width < width - NARROWER_PX / 2, "the sidebar is narrower"
-    yield from d.scroll(8)
-    d.screenshot("relight_narrow")
-    yield from d.stroke([(x + NARROWER_PX * (1 - i / 15), y) for i in range(16)])
-    props.light, props.resolution, props.samples = 'three_point', 64, 2
 
 
 def contact_sheet(root: Path):

@@ -133,7 +133,7 @@ def test_it_goes_as_it_came_and_an_undo_takes_it_back(head):
     assert np.abs(shown(head) - rest).max() < 1e-6
 
 
-def test_it_follows_another_shape_and_another_colour_and_what_was_set_stays(close_up, addon):
+def test_it_follows_another_shape_and_colour_and_what_was_set_or_modelled_stays_and_is_named(close_up, addon):
     eye, cornea = things(close_up)["Left Eye"], things(close_up)["Left Cornea"]
     assert not cornea.visible_shadow, "it would leave the iris in the dark"
     cornea.visible_shadow = True
@@ -143,31 +143,16 @@ def test_it_follows_another_shape_and_another_colour_and_what_was_set_stays(clos
     iris = next(slot.material for slot in eye.material_slots if slot.material["wildcap_inside"] == "iris")
     colour = tuple(iris.node_tree.nodes["WildCap Iris"].outputs[0].default_value)[:3]
     assert colour == pytest.approx(addon("acting.materials").IRISES["blue"])
-    worn = set(things(close_up).values())
-    write_head(capture_of(close_up), 1.15)
-    bpy.ops.wildcap.bring_in_head()
-    bpy.ops.wildcap.assemble_material()
-    assert set(things(close_up).values()) == worn
-    assert roughness.default_value == pytest.approx(0.77) and cornea.visible_shadow
-    for number, side in enumerate(SIDES):
-        centre = addon("acting.close_up.ball").of(close_up, number).centre
-        place = np.array(evaluated(things(close_up)[f"{side} Eye"]).matrix_local)[:3, 3]
-        assert place == pytest.approx(centre, abs=1e-5)
-    scene = addon("relight.picture").set_up_scene(close_up, "three_point", 64, 1)
-    assert worn <= set(scene.collection.objects)
-
-
-def test_what_was_modelled_stays_and_is_named_and_the_rest_follows_the_head(close_up, addon):
     worn = things(close_up)
     worn["Teeth"].shape_key_add(name="Gap").data[0].co.x += 0.01
     worn["Right Wet Line"].data.attributes.new("stain", 'FLOAT', 'POINT')
-    worn["Left Eye"].data.vertices[0].co.x += 0.002
+    worn["Right Caruncle"].data.vertices[0].co.x += 0.002
     worn["Right Eye"].location.y -= 0.001
     worn["Tongue"].vertex_groups.new(name="Jaw").add([0], 1.0, 'REPLACE')
     worn["Left Cornea"].data.uv_layers[0].data[5].uv.x += 0.1
     kept = {
         kind: (worn[kind].data, worn[kind].location.copy(), coordinates(worn[kind].data.vertices))
-        for kind in ("Teeth", "Right Wet Line", "Left Eye", "Right Eye", "Tongue", "Left Cornea")
+        for kind in ("Teeth", "Right Wet Line", "Right Caruncle", "Right Eye", "Tongue", "Left Cornea")
     }
     place = worn["Right Cornea"].location.copy()
     write_head(capture_of(close_up), 0.9)
@@ -182,6 +167,11 @@ def test_what_was_modelled_stays_and_is_named_and_the_rest_follows_the_head(clos
     assert worn["Right Cornea"].location != place
     assert "Gap" in worn["Teeth"].data.shape_keys.key_blocks
     assert len(worn["Right Eye"].animation_data.drivers) == 2
+    assert roughness.default_value == pytest.approx(0.77) and cornea.visible_shadow
+    place = np.array(evaluated(worn["Left Eye"]).matrix_local)[:3, 3]
+    assert place == pytest.approx(addon("acting.close_up.ball").of(close_up, 0).centre, abs=1e-5)
+    scene = addon("relight.picture").set_up_scene(close_up, "three_point", 64, 1)
+    assert set(worn.values()) <= set(scene.collection.objects)
 
 
 def test_a_head_that_is_subdivided_keeps_its_skin(close_up):

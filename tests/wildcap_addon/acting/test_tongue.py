@@ -12,11 +12,9 @@ bpy = pytest.importorskip("bpy")
 BVHTree = pytest.importorskip("mathutils.bvhtree").BVHTree
 
 from core.capture import sample_head  # noqa: E402
-from tests.fixtures import standin  # noqa: E402
 from tests.fixtures.acting_heads import (  # noqa: E402
     COPIES,
     HEAD,
-    TEMPLATE,
     as_set,
     coordinates,
     keep_only_mouth,
@@ -26,10 +24,9 @@ from tests.fixtures.acting_heads import (  # noqa: E402
     skin_around_mouth,
     things,
     tree_of,
-    write_head,
 )
 
-HIGHEST = {"built-in": 0.52, "of another person": 0.52, "captured": 2 / 3}
+HIGHEST = {"built-in": 0.52, "captured": 2 / 3}
 """How high the tongue may lie with the jaw fully open, of the way from the edges of the lower front teeth to those of
 the upper ones: at the half where the mouth's floor is not in its way. In the head that was captured it is."""
 SLIDES = ("jawForward", "jawLeft", "jawRight")
@@ -48,9 +45,7 @@ def mouth(request, saved_heads, tmp_path_factory):
         head = reopen(saved_heads, "close_up")
     else:
         bpy.ops.wm.read_homefile(use_empty=True)
-        folder = tmp_path_factory.mktemp("mouth")
-        root = sample_head.copy_to(folder).root if request.param == "captured" else write_person(folder / "face")
-        bpy.ops.wildcap.open_capture(directory=str(root))
+        bpy.ops.wildcap.open_capture(directory=str(sample_head.copy_to(tmp_path_factory.mktemp("mouth")).root))
         bpy.ops.wildcap.bring_in_head()
         bpy.ops.wildcap.assemble_material()
         head = bpy.context.view_layer.objects.active
@@ -60,21 +55,6 @@ def mouth(request, saved_heads, tmp_path_factory):
     keep_only_mouth(head)
     head["kind"] = request.param
     return head
-
-
-def write_person(root):
-    """Make a capture of the built-in head as one of its own identity space, as far from the mean as people are."""
-    path = standin.make(root) / "head.obj"
-    write_head(root, 1.0)
-    lines = path.read_text().splitlines()
-    with np.load(TEMPLATE.parent / "identity.npz") as stored:
-        components = stored["components"].astype(float)
-    offset = np.tensordot(np.random.default_rng(5).normal(0, 0.7, len(components)), components, 1)
-    rows = [number for number, line in enumerate(lines) if line.startswith("v ")]
-    for number, moved in zip(rows, offset, strict=True):
-        lines[number] = "v {:.6f} {:.6f} {:.6f}".format(*np.array(lines[number].split()[1:], float) + moved)
-    path.write_text("\n".join(lines) + "\n")
-    return root
 
 
 def lower_rows(head) -> np.ndarray:

@@ -5,7 +5,6 @@ unit, UVs, maps and shape keys."""
 
 import json
 import os
-import re
 import struct
 import subprocess
 import sys
@@ -21,6 +20,7 @@ pytest.importorskip("OpenImageIO", reason="the worker's part needs its packages"
 
 from tests.fixtures import delivered, mesh_reader  # noqa: E402
 from tests.fixtures.delivered import KEYS  # noqa: E402
+from tests.fixtures.refused import refuses  # noqa: E402
 
 CLAMPED, REPEATED = 33071, 10497  # in glTF
 HAIRS = np.array(
@@ -125,8 +125,7 @@ def test_gltf_with_files_refers_to_the_delivered_maps(deliver):
 def test_a_metahuman_gets_open_eyes_and_no_shape_keys(capture, deliver):
     pytest.importorskip("ufbx")
     bpy.context.scene.wildcap.captures[0].deliver.preset = 'metahuman'
-    with pytest.raises(RuntimeError, match="lids are closed"):
-        bpy.ops.wildcap.deliver()
+    refuses("lids are closed", bpy.ops.wildcap.deliver)
     head, moved = bpy.data.objects["face"], truth()
     for name, rows in (("eyesOpenLeft", slice(200, 210)), ("eyesOpenRight", slice(300, 310))):
         for point in head.shape_key_add(name=name, from_mix=False).data[rows]:
@@ -171,17 +170,6 @@ def test_usd_with_blend_shapes_colour_spaces_and_hair(hairy, deliver):
     assert np.allclose(widths, 8e-5, rtol=1e-3)
 
 
-def test_fbx_for_arnold_refers_to_linear_exr_numbered_by_tile(deliver):
-    folder = deliver(preset="arnold")
-    names = {
-        name.decode().replace("\\", "/")
-        for name in re.findall(rb"textures[\\/]\w+\.\w+\.exr", (folder / "face.fbx").read_bytes())
-    }
-    linked = ("base_color", "normal_camera", "specular", "specular_roughness")
-    assert names == {f"textures/face_{name}.1001.exr" for name in linked}
-    assert all((folder / name).is_file() for name in names)
-
-
 def test_obj_for_character_creator(deliver):
     folder = deliver(preset="character_creator")
     same_points(folder / "face.obj", 100 * y_up(truth()))
@@ -210,8 +198,7 @@ def test_a_read_only_capture_is_delivered_to_another_folder_and_nothing_in_it_ch
         os, "access", lambda path, mode: access(path, mode) and (mode != os.W_OK or Path(path) != capture.root)
     )
     before = contents()
-    with pytest.raises(RuntimeError, match="read-only"):
-        bpy.ops.wildcap.deliver()
+    refuses("read-only", bpy.ops.wildcap.deliver)
     bpy.context.scene.wildcap.captures[0].deliver.folder = str(tmp_path / "out")
     assert bpy.ops.wildcap.deliver() == {'FINISHED'}
     (folder,) = (tmp_path / "out").iterdir()
@@ -227,7 +214,7 @@ def test_a_head_with_face_units_keeps_their_names_their_moves_and_its_eyes(captu
     mesh = document["meshes"][0]
     names = mesh["extras"]["targetNames"]
     units = [key.name for key in keys.key_blocks[1:] if not key.name.startswith("eyesHalf")]
-    assert names == units and len(names) == 6 and not any(mesh.get("weights", []))
+    assert names == units and "jawOpen" in names and not any(mesh.get("weights", []))
     materials = [document["materials"][part["material"]] for part in mesh["primitives"]]
     assert [material["name"].split()[-2] for material in materials[1:]] == ["Eyes", "Mouth", "Teeth"]
     assert "baseColorTexture" in materials[1]["pbrMetallicRoughness"], "iris and white"

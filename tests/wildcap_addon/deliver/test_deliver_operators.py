@@ -13,6 +13,7 @@ pytest.importorskip("OpenImageIO", reason="the worker's part needs its packages"
 
 from tests.fixtures import delivered  # noqa: E402
 from tests.fixtures.drawn import drawn  # noqa: E402
+from tests.fixtures.refused import refuses  # noqa: E402
 
 HAIR, CLOSE_UP = "The hair stays here", "The close-up eyes and mouth stay here"
 
@@ -58,8 +59,7 @@ def test_a_delivery_waits_for_the_artist_to_leave_a_mode_and_a_failure_keeps_the
     folder = deliver()
     before = {path: path.read_bytes() for path in folder.rglob("*.*")}
     waiting, files = addon("deliver.waiting"), addon("deliver.files")
-    with pytest.raises(RuntimeError, match="No delivery waits"):
-        bpy.ops.wildcap.finish_delivery()
+    refuses("No delivery waits", bpy.ops.wildcap.finish_delivery)
     plan, root = addon("deliver.operators").planned(bpy.context), str(capture.root)
     delivered.deliver(capture)
     bpy.ops.object.mode_set(mode='SCULPT')
@@ -67,18 +67,14 @@ def test_a_delivery_waits_for_the_artist_to_leave_a_mode_and_a_failure_keeps_the
     assert waiting.ready(root) == plan
     bpy.ops.object.mode_set(mode='OBJECT')
     monkeypatch.setattr(files, "_gltf", lambda path: None)
-    with pytest.raises(RuntimeError, match=r"no face\.glb"):
-        bpy.ops.wildcap.finish_delivery()
+    refuses(r"no face\.glb", bpy.ops.wildcap.finish_delivery)
     waiting._ready[root] = plan
-    with pytest.raises(RuntimeError, match="maps of this delivery"):
-        bpy.ops.wildcap.finish_delivery()
+    refuses("maps of this delivery", bpy.ops.wildcap.finish_delivery)
     assert {path: path.read_bytes() for path in folder.rglob("*.*")} == before and not list(capture.exports.glob(".*"))
     shutil.rmtree(folder)
-    with pytest.raises(RuntimeError, match=folder.name):
-        bpy.ops.wildcap.open_delivery()
+    refuses(folder.name, bpy.ops.wildcap.open_delivery)
     waiting.forget()
-    with pytest.raises(RuntimeError, match="Nothing has been delivered"):
-        bpy.ops.wildcap.open_delivery()
+    refuses("Nothing has been delivered", bpy.ops.wildcap.open_delivery)
 
 
 def test_views_selection_and_the_active_object_are_afterwards_as_they_were(capture):
@@ -93,23 +89,19 @@ def test_views_selection_and_the_active_object_are_afterwards_as_they_were(captu
     space.region_3d.view_perspective = 'CAMERA'
     cube.select_set(True)
     head.select_set(False)
-    for what in ("own_mesh", "head"):
-        scene.wildcap.captures[0].deliver.what = what
-        assert bpy.ops.wildcap.deliver() == {'FINISHED'}
-        assert space.region_3d.view_perspective == 'CAMERA' and scene.camera == camera
-        assert bpy.context.view_layer.objects.active == head and bpy.context.selected_objects == [cube]
+    scene.wildcap.captures[0].deliver.what = "own_mesh"
+    assert bpy.ops.wildcap.deliver() == {'FINISHED'}
+    assert space.region_3d.view_perspective == 'CAMERA' and scene.camera == camera
+    assert bpy.context.view_layer.objects.active == head and bpy.context.selected_objects == [cube]
 
 
 def test_a_blender_without_an_exporter_says_so(addon, monkeypatch, tmp_path):
     files = addon("deliver.files")
     monkeypatch.setitem(files.ADDONS, ".glb", "none of these")
-    with pytest.raises(files.Problem, match="switched off"):
-        files.check(".glb")
+    refuses("switched off", files.check, ".glb")
     monkeypatch.setattr(files, "has_usd", lambda: False)
-    with pytest.raises(files.Problem, match="without USD"):
-        files.check(".usdc")
-    with pytest.raises(files.Problem, match="failed"):
-        files._call(bpy.ops.export_scene.fbx, tmp_path / "none" / "x.fbx", use_selection=True)
+    refuses("without USD", files.check, ".usdc")
+    refuses("failed", files._call, bpy.ops.export_scene.fbx, tmp_path / "none" / "x.fbx", use_selection=True)
 
 
 def test_the_terminal_delivers_too(addon, capture, capsys):

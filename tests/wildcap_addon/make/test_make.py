@@ -8,6 +8,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from tests.fixtures.refused import refuses
+
 bpy = pytest.importorskip("bpy")
 
 
@@ -103,8 +105,7 @@ def test_a_proposal_is_accepted_by_one_click(capture, job):
     assert bpy.ops.wildcap.accept_proposal() == {'FINISHED'} and (job.goal, job.first) == ("make", "solve")
     job.end(well=False)
     (capture / "texture.exr").unlink()
-    with pytest.raises(RuntimeError, match="no proposed mask"):
-        bpy.ops.wildcap.accept_proposal()
+    refuses("no proposed mask", bpy.ops.wildcap.accept_proposal)
 
 
 def test_the_terminal_runs_the_chain_with_the_solver_that_is_set_up(addon, capture, capfd, monkeypatch):

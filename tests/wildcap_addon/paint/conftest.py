@@ -16,15 +16,6 @@ def mask_image(addon):
 
 
 @pytest.fixture
-def head(capture):
-    """The capture's head in the scene."""
-    import bpy
-
-    bpy.ops.wildcap.bring_in_head()
-    return bpy.context.object
-
-
-@pytest.fixture
 def paint_spot(session, mask_image):
     """Function that paints a few texels from a row on, and nothing else, and returns the file of such a mask."""
 

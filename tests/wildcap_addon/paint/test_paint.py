@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.fixtures import standin
+from tests.fixtures.refused import refuses
 
 bpy = pytest.importorskip("bpy")
 
@@ -31,15 +32,6 @@ def test_the_mask_painted_on_the_left_cheek_is_saved_on_the_left_cheek(mask_imag
     assert column > width / 2, "the person's left is right of the middle of the map"
     assert row > height / 2, "the cheek is below the middle"
     assert (row, column) == (height - 1 - round(v * height), round(u * width))
-
-
-def test_the_last_ten_masks_are_kept(mask_image, capture, item, addon):
-    folder = addon("captures").folder(item)
-    image = mask_image.load(folder)
-    for value in (*np.linspace(0, 1, 12), 1):  # an unchanged mask is no new one
-        fill(image, value)
-        mask_image.store_mask(mask_image.mask_values(image), folder, 'SHADOW')
-    assert len(list((capture / "mask_history").iterdir())) == 10
 
 
 def test_strokes_reach_the_capture_while_the_artist_paints_on(session, mask_image, capture, head, monkeypatch):
@@ -109,8 +101,7 @@ def test_what_is_protected_is_a_mask_of_its_own(session, mask_image, capture, he
     click.finish_mask()
     click.paint_mask(mask='PROTECT')
     assert mask_image.grey_png(mask_image.mask_values(paint.stencil_image)) == painted
-    with pytest.raises(RuntimeError, match="no proposal for the protect mask"):
-        click.edit_mask(kind='PROPOSAL')
+    refuses("no proposal for the protect mask", click.edit_mask, kind='PROPOSAL')
     click.finish_mask()
     assert path.read_bytes() == painted
 

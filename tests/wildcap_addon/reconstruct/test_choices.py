@@ -19,9 +19,7 @@ def obj_rows(path, kind: str) -> list[list[float]]:
     return [[float(x) for x in line.split()[1:]] for line in lines if line.startswith(f"{kind} ")]
 
 
-def test_the_active_mesh_is_kept_as_it_is_with_its_uvs_and_without_modifiers(addon, capture, item):
-    bpy.ops.wildcap.bring_in_head()
-    head = bpy.context.view_layer.objects.active
+def test_the_active_mesh_is_kept_as_it_is_with_its_uvs_and_without_modifiers(addon, capture, item, head):
     refuses("own head or scan", bpy.ops.wildcap.use_active_mesh)
     bpy.ops.mesh.primitive_uv_sphere_add(segments=12, ring_count=8, location=(0, 0, 1))
     mine = bpy.context.view_layer.objects.active

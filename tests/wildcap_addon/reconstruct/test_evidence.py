@@ -53,9 +53,7 @@ def test_cameras_see_points_where_the_frames_saw_them(addon, reconstructed, reso
         assert behind.frame_method == ('FIT' if resolution[0] / resolution[1] < WIDTH / HEIGHT else 'CROP')
 
 
-def test_cameras_and_scan_come_in_again_in_place_and_go_with_the_head(addon, reconstructed):
-    bpy.ops.wildcap.bring_in_head()
-    head = bpy.context.view_layer.objects.active
+def test_cameras_and_scan_come_in_again_in_place_and_go_with_the_head(addon, reconstructed, head):
     for _ in range(2):
         bpy.ops.wildcap.bring_in_cameras()
         bpy.ops.wildcap.bring_in_scan()

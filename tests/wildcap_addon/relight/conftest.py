@@ -9,12 +9,3 @@ def patch(addon, tmp_path):
     from tests.fixtures import flat_patch
 
     return flat_patch.make(tmp_path / "patch.wildcap")
-
-
-@pytest.fixture
-def head(capture):
-    """The capture's head in the scene, active."""
-    import bpy
-
-    bpy.ops.wildcap.bring_in_head()
-    return bpy.context.view_layer.objects.active

@@ -8,7 +8,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 from tests.fixtures import node_text  # noqa: E402
-from tests.fixtures.flat_patch import assembled, height_map, paint, seen, sockets, white_world  # noqa: E402
+from tests.fixtures.flat_patch import assembled, height_map, sockets  # noqa: E402
 
 EXPECTED = """
 ShaderNodeAttribute WildCap Regions: attribute_name=wildcap_roughness
@@ -118,28 +118,6 @@ def test_a_group_of_an_older_version_is_rebuilt_inside_and_keeps_what_the_artist
         "WildCap Given Back.Result -> WildCap Principled.Base Color",
         "WildCap Coat.Value -> WildCap Principled.Coat Weight",
     }
-
-
-def test_saved_moved_and_opened_again_it_gives_the_same_pixels(patch, tmp_path):
-    folder = tmp_path / "before"
-    folder.mkdir()
-    patch.rename(folder / "patch.wildcap")
-    bpy.ops.wm.read_homefile(use_empty=True)
-    bpy.ops.wildcap.open_capture(directory=str(folder / "patch.wildcap"))
-    rows = [[(0.8, 0.5, 0.3), (0.2, 0.3, 0.4)], [(0.5, 0.5, 0.5), (0.9, 0.1, 0.2)]]
-    paint(folder / "patch.wildcap", "diffuse_albedo.png", rows)
-    sockets(assembled())["Roughness"].default_value = 0.33
-    white_world()
-    before = seen(tmp_path / "shot.exr")
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"))
-    folder.rename(tmp_path / "after")
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "after" / "scene.blend"))
-    material = bpy.data.objects["patch"].active_material
-    images = {node.name: node.image for node in material.node_tree.nodes if node.bl_idname == 'ShaderNodeTexImage'}
-    assert all(bpy.path.abspath(image.filepath).startswith(str(tmp_path / "after")) for image in images.values())
-    spaces = [images[f"WildCap {name}"].colorspace_settings.name for name in ("Albedo", "Specular", "Normal")]
-    assert spaces == ["sRGB", "Non-Color", "Non-Color"]
-    assert np.array_equal(seen(tmp_path / "shot.exr"), before) and before.std() > 0.01
 
 
 def test_the_group_is_an_asset_with_a_preview_and_a_catalogue(patch, addon, tmp_path):

@@ -7,15 +7,10 @@ import numpy as np
 import pytest
 
 from tests.fixtures import standin
+from tests.fixtures.refused import refuses
 
 bpy = pytest.importorskip("bpy")
 U, V = standin.LEFT_CHEEK_UV
-
-
-@pytest.fixture
-def head(addon, capture):
-    bpy.ops.wildcap.bring_in_head()
-    return bpy.context.view_layer.objects.active
 
 
 def marked(name: str, is_float: bool, side: int = 256):
@@ -60,5 +55,4 @@ def test_the_colour_is_the_textures_as_the_eye_sees_it(addon, head, is_float):
 
 def test_without_a_texture_there_is_nothing_to_pick(head):
     head.data.materials.clear()
-    with pytest.raises(RuntimeError, match="shows no texture"):
-        bpy.ops.wildcap.pick_skin_tone(uv=(U, V))
+    refuses("shows no texture", bpy.ops.wildcap.pick_skin_tone, uv=(U, V))

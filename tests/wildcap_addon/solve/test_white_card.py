@@ -70,34 +70,29 @@ def estimate(addon, monkeypatch):
     return estimate
 
 
-def test_the_chart_that_the_solver_finds_reaches_the_settings(item, estimate):
-    assert estimate("find_color_checker", {"white_point": [0.9, 0.8, 0.6]}) == "white_point"
-    assert item.solve.white_point == "0.9000,0.8000,0.6000"
-
-
 @pytest.mark.parametrize(
-    ("click", "figures", "kept"),
+    ("click", "tool", "figures", "kept"),
     [
-        ("estimate_skin_tone", {"skin_tone_srgb": [0.5, 0.4, 0.3]}, lambda item: item.use_skin_tone),
-        ("find_color_checker", {"white_point": [0.9, 0.8, 0.6]}, lambda item: item.solve.white_point != "auto"),
+        ("estimate_skin_tone", "skin_tone", {"skin_tone_srgb": [0.5, 0.4, 0.3]}, lambda item: item.use_skin_tone),
+        (
+            "find_color_checker",
+            "white_point",
+            {"white_point": [0.9, 0.8, 0.6]},
+            lambda item: item.solve.white_point == "0.9000,0.8000,0.6000",
+        ),
     ],
 )
-def test_undo_of_what_came_after_an_estimate_leaves_the_estimate(item, estimate, click, figures, kept):
+def test_undo_of_what_came_after_an_estimate_leaves_the_estimate(item, estimate, click, tool, figures, kept):
     if not bpy.context.window_manager.windows:
         pytest.skip("no window in this Blender: the flows in a window hold it")
     cube = bpy.data.objects.new("Cube", None)
     bpy.context.scene.collection.objects.link(cube)
     bpy.ops.ed.undo_push(message="Cube")
-    estimate(click, figures)
+    assert estimate(click, figures) == tool
     bpy.data.objects["Cube"].location.x = 1
     bpy.ops.ed.undo_push(message="Move")
     bpy.ops.ed.undo()
     assert bpy.data.objects["Cube"].location.x == 0 and kept(bpy.context.scene.wildcap.captures[0])
-
-
-def test_operators_that_change_the_scene_are_steps_of_undo(addon):
-    for name in ("solve", "solve_edited", "fit_landmarks"):
-        assert 'UNDO' in getattr(bpy.types, f"WILDCAP_OT_{name}").bl_options
 
 
 def test_the_panel_says_where_the_tone_comes_from(addon, item, estimate):
