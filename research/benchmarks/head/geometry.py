@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the video to the textured head, measured: cameras, scan, head and texture of several captures, with what each
-stage cost.
+"""Errors of cameras, scan, head and texture of several captures, with the cost of each stage.
 
     python -m research.benchmarks.head.geometry FOLDER [--captures NAME ...] [--data FOLDER] [--fresh] [--json
     research/records/geometry.json]
@@ -41,8 +40,11 @@ LAST = "texture"
 
 @dataclass(frozen=True)
 class ScannedSubject:
-    """What is captured, and what is known of it: `truth` laid out as research/benchmarks/maps/albedo_score.py says,
-    `mesh` the true surface where it is not `truth`'s own."""
+    """Source of a capture and its truth.
+
+    truth: laid out as research/benchmarks/maps/albedo_score.py says; mesh: the true surface, if it is not that of the
+    truth.
+    """
 
     source: Path
     truth: Path | None = None
@@ -96,8 +98,10 @@ def measure_capture(name: str, subject: ScannedSubject, folder: Path, fresh: boo
 
 
 def run_stages(capture: Capture, source: Path) -> tuple[dict, dict | None]:
-    """Per stage its seconds and peak memory in MB; and the problem and remedy that ended the run, or None. Costs of
-    stages that were fresh are kept."""
+    """Return the seconds and peak memory (MB) of each stage, and the problem that ended the run, or None.
+
+    Costs of stages that were fresh are kept.
+    """
     path = capture.root / "costs.json"
     costs = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
     for stage in stages.NAMES[: stages.NAMES.index(LAST) + 1]:

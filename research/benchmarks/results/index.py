@@ -162,8 +162,7 @@ def worse_in_the_picture(gains: dict[str, float]) -> str:
 
 
 def the_synthetic(people: Iterable[str]) -> str:
-    """Return how many people are of research/benchmarks/captures/likenesses.py, and how many of
-    research/benchmarks/captures/people.py."""
+    """Return how many people are of captures/likenesses.py, and how many of captures/people.py."""
     made = [name for name in people if not is_scanned(name)]
     bald = [name for name in made if is_bald(name)]
     kinds = [(len(made) - len(bald), "with strands, eyes and a phone's pipeline"), (len(bald), "bald, by true cameras")]
