@@ -8,7 +8,7 @@ import pytest
 
 from core.face import eye_reader
 from core.face.eye_reader import SIDE_PX
-from core.face.parts import cut
+from core.face.parts import PARTS, cut
 from research.people.lifelike import eye_sights
 from research.training import eyes as training
 
@@ -37,7 +37,7 @@ def test_a_sight_knows_the_white_and_the_iris_of_the_eye_in_its_middle(sights):
         outer, inner = sight.corners
         assert bool(sight.left) is left and (outer[0] > inner[0]) == left
         assert np.abs((outer + inner) / 2 - eye_sights.SIZE / 2).max() < 1
-        eyes = sight.unlit.shares[..., eye_sights.EYES] / 255.0
+        eyes = sight.unlit.shares[..., PARTS.index("eyes")] / 255.0
         assert (ball.sum(-1) <= eyes + 0.02).all(), "lashes belong to the eyes but not to the ball"
         near = np.linalg.norm(np.argwhere(ball[..., 1] > 0.5)[:, ::-1] + 0.5 - (outer + inner) / 2, axis=1)
         assert len(near) > 30 and near.max() < np.linalg.norm(outer - inner)
