@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+import torch
 
 from ...face.head import Unfolded
 from ...geometry.raster import interpolate, sample, sample_uv
@@ -32,7 +33,8 @@ class ShadingEstimate:
 
     box: left, top and side in pixels of the square it covers; shading [h, h, 3] natural log, shadow [h, h] in [0, 1]
     and log [h, h, 3], the picture's own at that size; face int [h, h] and bary [h, h, 3]: the head there (-1: none), if
-    it is known.
+    it is known. grid [1, 4, bins, h, h]: what the network said, and answer [h, h, 3] the shading of it, which
+    `shading` moves away from as more is known.
     """
 
     box: tuple[float, float, float]
@@ -41,6 +43,8 @@ class ShadingEstimate:
     log: np.ndarray
     face: np.ndarray | None = None
     bary: np.ndarray | None = None
+    grid: torch.Tensor | None = None
+    answer: np.ndarray | None = None
 
 
 def even_out(head: LitHead, views: list[View], looks: list[ShadingEstimate]) -> list[ShadingEstimate]:

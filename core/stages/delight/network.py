@@ -36,7 +36,7 @@ from .lit_head import MAX_ALBEDO, LitHead, fit_lit_head
 from .occlusion import remove_seams
 from .second_opinion import continue_beyond, weigh_in
 from .shading import light_in_frame, light_seen
-from .unet import MIN_LINEAR, SIDE_PX, DelightNet, network_input
+from .unet import MIN_LINEAR, SIDE_PX, DelightNet, network_input, slice_grid
 
 DATA_FILES = ("weights/delighter.safetensors", "weights/delighter.json")
 WEIGHTS = Path(__file__).resolve().parents[2] / DATA_FILES[0]
@@ -165,17 +165,29 @@ def look_at(
     net: DelightNet, box: tuple[float, float, float], picture: np.ndarray, geometry: tuple = ()
 ) -> ShadingEstimate:
     """Return the network's mean answer on a square picture and its mirror image."""
+    grid, middle = ask_grid(net, picture, geometry)
+    log = np.log(np.maximum(_halved(images.srgb_to_linear(picture)), MIN_LINEAR))
+    answer = slice_grid(grid, torch.from_numpy(log.transpose(2, 0, 1))[None].to(grid.device))
+    answer = answer[0].cpu().numpy().transpose(1, 2, 0)
+    shading = answer[..., :3] + middle
+    grid[:, :3] += middle
+    return ShadingEstimate(box, shading, answer[..., 3], log, grid=grid, answer=shading)
+
+
+@torch.inference_mode()
+def ask_grid(net: DelightNet, picture: np.ndarray, geometry: tuple = ()) -> tuple[torch.Tensor, float]:
+    """Return the network's mean grid [1, 4, bins, h, h] of a square picture and its mirror image, and its middle.
+
+    The shadows are shares in [0, 1] already.
+    """
     layers, middle = network_input(picture, *geometry)
     mirrored = layers[:, :, ::-1].copy()
     mirrored[12] *= -1
     device = next(net.parameters()).device
     both = torch.from_numpy(np.stack([layers, mirrored])).to(device, memory_format=torch.channels_last)
-    shading, shadow = net(both)
-    shading, shadow = (
-        (output[0] + output[1].flip(-1)).cpu().numpy().transpose(1, 2, 0) / 2 for output in (shading, shadow.sigmoid())
-    )
-    log = np.log(np.maximum(_halved(images.srgb_to_linear(picture)), MIN_LINEAR))
-    return ShadingEstimate(box, shading + middle, shadow[..., 0], log)
+    grid = net(both)
+    grid[:, 3] = grid[:, 3].sigmoid()
+    return (grid[:1] + grid[1:].flip(-1)) / 2, middle
 
 
 def _halved(picture: np.ndarray) -> np.ndarray:
@@ -200,10 +212,16 @@ def divide(
     linear = images.srgb_to_linear(srgb)
     size = round(look.box[2])
     log = np.log(np.maximum(crop(linear, look.box, size), MIN_LINEAR))
-    shading, shadow = lift_shading(look.shading, log), lift_share(look.shadow, log)
     cell, skin = size / len(skin), cv2.resize(skin, (size, size), interpolation=cv2.INTER_LINEAR)
-    zone, fine = SEAM_ZONE_CELLS * cell, SEAM_FINE_CELLS * cell
-    shading = shading + remove_seams(log - shading, 1 - shadow, skin > 0.5, zone, fine)
+    if look.grid is not None and look.grid.shape[2] > 1:
+        said = slice_grid(look.grid, torch.from_numpy(log.transpose(2, 0, 1))[None].to(look.grid.device))
+        said = said[0].cpu().numpy().transpose(1, 2, 0)
+        moved = cv2.resize(look.shading - look.answer, (size, size), interpolation=cv2.INTER_LINEAR)
+        shading, shadow = said[..., :3] + moved, said[..., 3]
+    else:
+        shading, shadow = lift_shading(look.shading, log), lift_share(look.shadow, log)
+        zone, fine = SEAM_ZONE_CELLS * cell, SEAM_FINE_CELLS * cell
+        shading = shading + remove_seams(log - shading, 1 - shadow, skin > 0.5, zone, fine)
     shape = srgb.shape[:2]
     y, x = np.mgrid[0 : shape[0], 0 : shape[1]]
     at = (np.stack([x.ravel(), y.ravel()], -1) + 0.5 - look.box[:2]) * size / look.box[2]

@@ -8,13 +8,14 @@ import json
 import cv2
 import numpy as np
 import pytest
+import torch
 
 from core.imaging import images
 from core.stages.delight.evening import ShadingEstimate
 from core.stages.delight.lit_head import MAX_ALBEDO
 from core.stages.delight.network import WEIGHTS, crop, divide, load_network, square_around
 from core.stages.delight.second_opinion import Weighing, continue_beyond, weigh_in
-from core.stages.delight.unet import network_input
+from core.stages.delight.unet import BIN_LOG, network_input, slice_grid
 from research.people.identities import reserved_seeds
 from tests.fixtures.refused import refused
 
@@ -30,6 +31,23 @@ def test_a_crop_finds_a_place_again():
         assert np.abs(cut[2:-2, size // 2, 1] - (20 + at[2:-2])).max() < 0.1
     left, top, side = square_around(np.array([[100, 50], [140, 90.0]]))
     assert (left + side / 2, top + side / 2) == pytest.approx((120, 70)) and side > 40
+
+
+def test_a_grid_is_read_by_the_luminance_about_its_mean():
+    """Beside an edge the two sides lie in bins of their own; on even ground the middle bin counts, at any size."""
+    value = torch.tensor([-1.0, 0.0, 1.0])
+    grid = value.view(1, 1, 3, 1, 1).expand(1, 1, 3, 16, 16)
+    even = torch.full((1, 3, 48, 80), -2.0)
+    assert slice_grid(grid, even).abs().max() < 1e-5
+    edge = even.clone()
+    edge[..., 40:] += 2 * BIN_LOG
+    answer = slice_grid(grid, edge)[0, 0, 24]
+    assert answer[39] == pytest.approx(-1, abs=0.12) and answer[40] == pytest.approx(1, abs=0.12)
+    assert answer[[0, -1]].abs().max() < 1e-5
+    ramp = torch.linspace(0, 1, 16).expand(1, 1, 1, 16, 16)
+    centres = (np.arange(48) + 0.5) / 48 * 16 - 0.5
+    expected = np.interp(centres, np.arange(16), np.linspace(0, 1, 16))
+    assert np.allclose(slice_grid(ramp, torch.zeros(1, 3, 48, 48))[0, 0, 0], expected, atol=1e-5), "one bin is a map"
 
 
 def test_the_input_does_not_know_the_exposure():
