@@ -130,7 +130,7 @@ def trace_sight(
     normal = _with_relief(smooth, _tangents(stage)[where], raster.sample_uv(relief, uv))
     if open_eyes:
         _open_eyes(stage, view, hit, albedo, shine, masks, rng)
-    lamps, radius = _random_lamps(rng)
+    lamps, radius = random_lamps(rng)
     reach = np.stack(
         [trace_sun(caster, position, smooth, lamp, r, RAYS, rng) for lamp, r in zip(lamps, radius, strict=True)]
     )
@@ -174,7 +174,7 @@ def full(sight: Sight) -> Sight:
     return replace(sight, **single, reach=sight.reach.astype(np.float32) / 255)
 
 
-def _random_lamps(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def random_lamps(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Draw directions [LAMPS, 3] and angular radii [LAMPS] of lamps, mostly before and above the face."""
     towards = rng.normal(size=(LAMPS, 3)) * [1.0, 0.8, 0.7] + [0, -0.7, 0.5]
     return unit(towards), np.exp(rng.uniform(np.log(0.004), np.log(0.2), LAMPS))

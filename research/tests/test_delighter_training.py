@@ -5,10 +5,12 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
+import torch
 
 from core.capture.messages import Reporter
 from core.geometry.meshes import vertex_normals
-from core.stages.delight.unet import SIDE_PX
+from core.stages.delight.unet import CHANNELS, SIDE_PX
 from research.people import olat, sight
 from research.people.identities import subject_mesh
 from research.training import delighter, people, portraits
@@ -16,7 +18,7 @@ from research.training.descent import Run
 from research.training.networks import train
 
 CONFIG = {
-    "model": {"widths": [16, 16, 16, 16], "depths": [1, 1, 1, 1]},
+    "model": {"widths": [16, 16, 16, 16], "depths": [1, 1, 1, 1], "bins": 3},
     "training": dict(pairs=1, echo=2, rate=1e-3, minutes=1, skins=1, people=1, views=1, held_out=1, seed=0, workers=0),
 }
 
@@ -29,10 +31,29 @@ def test_a_training_starts_from_weights_and_its_card_says_so(monkeypatch, tmp_pa
     run = Run("cpu", work, tmp_path / "out.safetensors", minutes=0.005)
     first = train(delighter.TRAINING, run, report)
     assert first["steps"] > 0 and first["started"] == "random weights" and first["people"] == first["seeds"]
-    assert first["held_out"]["none"] > 0 and first["held_out"]["people_none"] > 0
+    assert first["held_out"]["subject_none"] > 0 and first["held_out"]["person_none"] > 0
     (work / "state.pt").unlink()
     second = train(delighter.TRAINING, replace(run, out=tmp_path / "next.safetensors", start=run.out), report)
     assert second["started"] == "the weights before" and second["command"].endswith("--start delighter.safetensors")
+
+
+def test_what_the_studio_gave_real_people_in_the_large_costs_nothing():
+    """A coarse error that both lights share is the studio's; one that the lights do not share is the network's."""
+    y, x = np.mgrid[0:SIDE_PX, 0:SIDE_PX].astype(np.float32) / SIDE_PX
+    coarse, fine = (torch.from_numpy(0.3 * np.sin(2 * np.pi * n * x))[None, None].expand(1, 3, -1, -1) for n in (1, 32))
+    one = torch.ones(2, 1, SIDE_PX, SIDE_PX)
+
+    def cost(first: torch.Tensor, second: torch.Tensor, real: bool) -> float:
+        shading = torch.cat([first, second])
+        flags = torch.full((2, 1, 1, 1), float(real))
+        batch = portraits.PortraitBatch(0 * one.expand(-1, CHANNELS, -1, -1), shading, one, 0 * one, 0 * one, flags)
+        return delighter.losses(delighter.DelightNet(**CONFIG["model"]), batch)["shading"].item()
+
+    size = coarse.abs().mean().item()
+    assert cost(coarse, coarse, False) == pytest.approx(size, rel=1e-3)
+    assert cost(coarse, coarse, True) < 0.15 * size, "but at the border"
+    assert cost(coarse, -coarse, True) == pytest.approx(size, rel=1e-3)
+    assert cost(fine, fine, True) == pytest.approx(fine.abs().mean().item(), rel=0.02)
 
 
 def make_plain_sights(store, seed, **_):

@@ -32,7 +32,8 @@ class Run:
 
     config: name of the configuration; work: folder of prepared data and checkpoint; out: safetensors, fp16; minutes: in
     all, those of earlier runs included (None: the configuration's); hdri: folder of panoramas; skins: folder of carried
-    skins, held_out: those of it that are kept from training; start: initial weights.
+    skins, held_out: those of it that are kept from training; photographs: folder of real people; start: initial
+    weights.
     """
 
     config: str
@@ -42,6 +43,7 @@ class Run:
     hdri: Path | None = None
     skins: Path | None = None
     held_out: tuple[str, ...] = ()
+    photographs: Path | None = None
     start: Path | None = None
 
 

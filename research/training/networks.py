@@ -25,6 +25,7 @@ OPTIONS = {
     "held-out": dict(
         nargs="+", default=(), metavar="NAME", help="skins of FOLDER kept from training, each with its cluster"
     ),
+    "photographs": dict(type=Path, metavar="FOLDER", help="london_faces: photographs of real people in one light"),
     "start": dict(type=Path, metavar="FILE", help="weights to begin with, in place of random ones"),
 }
 """Options that only some trainings have."""
@@ -57,7 +58,7 @@ class Training:
 
     build(configuration) makes the network; prepare(run, options, report) makes what is kept in the work folder, and may
     be run alone; start(run, options, report) then opens the data; describe(state) returns the card's entries; options:
-    of OPTIONS.
+    of OPTIONS; load(network, weights) starts from earlier weights.
     """
 
     name: str
@@ -68,6 +69,7 @@ class Training:
     describe: Callable[[dict], Card]
     prepare: Callable[[Run, dict, Reporter], None] | None = None
     options: tuple[str, ...] = ()
+    load: Callable[[torch.nn.Module, dict], object] = torch.nn.Module.load_state_dict
 
 
 def run_command(training: Training, description: str, arguments: list[str]) -> None:
@@ -118,7 +120,7 @@ def train(training: Training, run: Run, report: Reporter) -> dict:
     torch.manual_seed(options["seed"])
     network = training.build(config)
     if run.start:
-        network.load_state_dict({name: value.float() for name, value in load_file(run.start).items()})
+        training.load(network, {name: value.float() for name, value in load_file(run.start).items()})
     descend(network, training.start(run, options, report), training.recipe, options, run, report)
     return export(training, run.work, run.out)
 

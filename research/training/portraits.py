@@ -14,7 +14,6 @@ import cv2
 import numpy as np
 import torch
 from safetensors.torch import load_file
-from torch.nn import functional
 
 from core.capture.files import replacing
 from core.capture.messages import Reporter
@@ -39,7 +38,7 @@ SLIP_PX = 0.8, 2.0
 registered to a film, and one fitted to the landmarks of a single photograph."""
 FROM_LANDMARKS = 0.4  # share of the latter
 LEAST = 0.01  # shading of which the logarithm is learnt; below is noise
-LEAST_WEIGHT = 0.25  # of what is no skin, beside skin's 1
+LEAST_WEIGHT = 0.25  # of what is no part of the face, beside its 1
 CARRIED = 0.35
 """Share of the subjects that wear a carried skin, if there are any."""
 
@@ -47,8 +46,9 @@ CARRIED = 0.35
 class PortraitBatch(NamedTuple):
     """Portraits, of which 2 k and 2 k + 1 are the same sight under two lights.
 
-    layers [N, CHANNELS, SIDE, SIDE]; at half the size [N, C, SIDE / 2, SIDE / 2]: shading (3), the true log-shading
-    less the picture's middle, weight (1) of its error, shadow (1) and shadow_weight (1).
+    layers [N, CHANNELS, SIDE, SIDE]; of the same size: shading (3), the true log-shading less the picture's middle,
+    weight (1) of its error, shadow (1) and shadow_weight (1). real [N, 1, 1, 1]: 1 for photographs of real people,
+    whose albedo is not known in the large.
     """
 
     layers: torch.Tensor
@@ -56,23 +56,35 @@ class PortraitBatch(NamedTuple):
     weight: torch.Tensor
     shadow: torch.Tensor
     shadow_weight: torch.Tensor
+    real: torch.Tensor
 
 
 def shoot(
     path: Path, rng: np.random.Generator, panoramas: list[np.ndarray], augment: bool = True
 ) -> Iterator[tuple[np.ndarray, ...]]:
     """Portray a sight under two lights; with `augment`, of another tone than the subject's own."""
-    view = sight.full(sight.load(path))
+    return light_twice(sight.full(sight.load(path)), _read_stage(path.parent), rng, panoramas, augment)
+
+
+def light_twice(
+    view: sight.Sight,
+    stage: LightStage,
+    rng: np.random.Generator,
+    panoramas: list[np.ndarray],
+    augment: bool = True,
+    real: bool = False,
+) -> Iterator[tuple[np.ndarray, ...]]:
+    """Portray a sight of a head under two lights; with `augment`, of another tone than its own."""
     albedo = view.albedo
     if augment:
         gain = np.exp(rng.normal(0, 0.12) + rng.normal(0, 0.04, 3))
         albedo = np.clip(albedo * gain, 0.003, 0.9).astype(np.float32)
     for _ in range(2):
-        lit = relight_sight(view, _read_stage(path.parent), rng, panoramas, albedo)
+        lit = relight_sight(view, stage, rng, panoramas, albedo)
         normal = lit.fitted.normal @ view.rotation.T.astype(np.float32)
         there = np.ones(len(view.pixel), np.float32)
         maps = map(view.picture, (lit.fitted.ambient, lit.fitted.sunlit, normal, there))
-        yield make_example(lit, tuple(maps), rng)
+        yield make_example(lit, tuple(maps), rng, real)
 
 
 @cache
@@ -84,12 +96,12 @@ def _read_stage(folder: Path) -> LightStage:
 
 
 def make_example(
-    portrait: Portrait, geometry_maps: tuple[np.ndarray, ...], rng: np.random.Generator
+    portrait: Portrait, geometry_maps: tuple[np.ndarray, ...], rng: np.random.Generator, real: bool = False
 ) -> tuple[np.ndarray, ...]:
     """Return the arrays of a PortraitBatch for one portrait.
 
     geometry_maps: ambient, sunlit and normal [S, S, 3] (camera coordinates) of the registered head, and where it is
-    [S, S].
+    [S, S]. Every part of the face has weight: skin, brows, beard, lips, eyes.
     """
     geometry = ()
     if rng.random() < WITH_GEOMETRY:
@@ -100,13 +112,15 @@ def make_example(
             for array in geometry_maps
         ]
     layers, middle = network_input(portrait.srgb, *geometry)
-    sure = (_half(portrait.head) > 0.99) & (_half(portrait.albedo).min(-1) > 0.002)
-    shading = np.log(np.maximum(_half(portrait.even), LEAST)) - middle
-    weight = sure * (LEAST_WEIGHT + (1 - LEAST_WEIGHT) * _half(portrait.skin))
+    sure = (portrait.head > 0.99) & (portrait.albedo.min(-1) > 0.002)
+    shading = np.log(np.maximum(portrait.even, LEAST)) - middle
+    elsewhere = 0.0 if real else LEAST_WEIGHT
+    weight = sure * (elsewhere + (1 - elsewhere) * portrait.face)
     strong = portrait.strong
     trust = 1.0 if strong > 0.4 or strong < 0.1 else 0.3  # in between it is a matter of taste what is a shadow
-    shadow = _half(portrait.shadow)[None] * (strong > 0.2)
-    parts = layers, shading.transpose(2, 0, 1), weight[None], shadow, (sure * trust)[None]
+    shadow = portrait.shadow[None] * (strong > 0.2)
+    flag = np.full((1, 1, 1), real)
+    parts = layers, shading.transpose(2, 0, 1), weight[None], shadow, (sure * trust)[None], flag
     return tuple(np.ascontiguousarray(array, np.float32) for array in parts)
 
 
@@ -123,8 +137,7 @@ def repainted(batch: PortraitBatch, rng: np.random.Generator) -> PortraitBatch:
     The shading stays what it was, but for the picture's middle.
     """
     layers, shading, side = batch.layers.clone(), batch.shading.clone(), batch.layers.shape[-1]
-    skin = ((batch.weight - LEAST_WEIGHT) / (1 - LEAST_WEIGHT)).clamp(0, 1)
-    skin = functional.interpolate(skin, scale_factor=2, mode="bilinear").numpy()[:, 0, ..., None]
+    skin = ((batch.weight - LEAST_WEIGHT) / (1 - LEAST_WEIGHT)).clamp(0, 1).numpy()[:, 0, ..., None]
     for first in range(0, len(layers), 2):
         paint = _paint(side, rng)
         for k in (first, first + 1):
@@ -150,11 +163,6 @@ def _paint(side: int, rng: np.random.Generator) -> np.ndarray:
         if rng.random() < odds:
             log += make(side, rng=rng)
     return log
-
-
-def _half(picture: np.ndarray) -> np.ndarray:
-    half = SIDE_PX // 2, SIDE_PX // 2
-    return cv2.resize(np.ascontiguousarray(picture, np.float32), half, interpolation=cv2.INTER_AREA)
 
 
 def make_sights(store: SightStore, seed: int, skins: Path | None = None, names: list[str] = ()) -> None:
