@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Twelve real people relit hard: what a delighter makes of pictures whose albedo is known.
 
-    python -m research.benchmarks.delighting.relit_people LONDON HDRI [--weights FILE ...] [--json PATH] [--look FOLDER]
+    python -m research.benchmarks.delighting.real_people LONDON HDRI [--weights FILE ...] [--json PATH] [--look FOLDER]
 
 LONDON is the folder london_faces; the judges of research/people/london.py are relit under the panoramas of HDRI, which
 no training has (hdri_extra), and lamps. Columns, natural log, root mean square over the face after one gain per
@@ -36,7 +36,7 @@ from ...people.olat import light_stage
 from ...people.portrait import relight_sight
 from .. import figures
 
-COMMAND = "python -m research.benchmarks.delighting.relit_people LONDON HDRI --json research/records/relit_people.json"
+COMMAND = "python -m research.benchmarks.delighting.real_people LONDON HDRI --json research/records/real_people.json"
 SIDE_PX, SIGHTS = 512, 2
 STRONG = 0.3  # least share of the lamps in the light of a picture: harder than most
 FINE = 1 / 8  # of the face's width: the deviation of the blur that parts fine from coarse is half of it
@@ -54,7 +54,7 @@ class Sitting:
 
 
 def main() -> None:
-    parser = figures.command_line(__doc__, "relit_people")
+    parser = figures.command_line(__doc__, "real_people")
     parser.add_argument("london", type=Path)
     parser.add_argument("hdri", type=Path)
     parser.add_argument("--weights", type=Path, nargs="*", default=[], help="networks beside the shipped one")
@@ -62,8 +62,8 @@ def main() -> None:
     options = parser.parse_args()
     sittings = list(sit(options.london, options.hdri))
     answers = {"photograph": lambda srgb: srgb, "flat colour": _flat, "whole path": _whole_path}
-    for path in (WEIGHTS, *options.weights):
-        answers[f"network alone, {path.parent.name}/{path.stem}"] = _alone(path)
+    answers["network alone"] = _alone(WEIGHTS)
+    answers |= {f"{path.parent.name}/{path.stem} alone": _alone(path) for path in options.weights}
     record, logs = {}, {}
     for name, answer in answers.items():
         logs[name] = [[_log(answer(srgb)) for srgb in sitting.srgb] for sitting in sittings]
@@ -71,7 +71,7 @@ def main() -> None:
         print(f"{name:44}", row(record[name]), flush=True)
     if options.look:
         _look(options.look, sittings, logs)
-    figures.write_record(options.json, "relit_people", COMMAND, record)
+    figures.write_record(options.json, "real_people", COMMAND, record)
 
 
 def sit(folder: Path, hdri: Path) -> Iterator[Sitting]:
