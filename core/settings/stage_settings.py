@@ -141,7 +141,7 @@ class SolveSettings:
     prior: str = setting("", path="folder", flag="--prior", holds=("config.json", "ckpt.pth"))
     """The authors' prior: the folder with its config.json and ckpt.pth. It needs ICT-FaceKit fitted as template, in
     whose UVs it works; empty: ours"""
-    together: str = setting("", path="folder", label="Other Captures", flag="--with")
+    together: str = setting("", path="folder", label="Combine With", flag="--with")
     """Another capture of the same person in other light, or a folder of several: what they agree on is skin, what
     differs is light. Empty: alone"""
     checkpoint_every: int = setting(5, min=1, max=600, affects_result=False)
