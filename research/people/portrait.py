@@ -34,8 +34,8 @@ class Portrait:
     srgb [S, S, 3]: the file; albedo [S, S, 3]: linear, 0 off the head; even [S, S, 3]: factor on an albedo of one tone
     for skin and one for lips, highlights, clipping and camera curve included, so that nothing of the pigment is in it;
     shadow [S, S] in [0, 1]: share of the lamps' light that is blocked or turned away, 0 without lamps; strong in [0,
-    1]: share of that light in all irradiance, facing it; head and face, with brows, beard, lips and eyes, without what
-    hangs over it [S, S] in [0, 1]; fitted [P].
+    1]: share of that light in all irradiance, facing it; head, skin and face, with brows, beard, lips and eyes, without
+    what hangs over it [S, S] in [0, 1]; fitted [P].
     """
 
     srgb: np.ndarray
@@ -44,6 +44,7 @@ class Portrait:
     shadow: np.ndarray
     strong: float
     head: np.ndarray
+    skin: np.ndarray
     face: np.ndarray
     fitted: FittedLight
 
@@ -103,6 +104,7 @@ def relight_sight(
         sight.picture(shadow),
         strong,
         head * bare,
+        sight.picture(sight.mask("skin") * (1 - sight.mask("eyes"))) * bare,
         sight.picture(sight.mask("face")) * bare,
         fitted_light(
             sight.at_pixels(transfer @ BASIS.astype(np.float32)), sight.smooth, lamps, environment, tone * gains, rng

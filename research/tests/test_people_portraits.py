@@ -66,7 +66,7 @@ def test_light_does_not_know_the_pigment(stage):
     ]
     pictures = [images.srgb_to_linear(portrait.srgb) for portrait in made]
     assert contrast(pictures[1], stage) - contrast(pictures[0], stage) > 0.8
-    known = (made[0].face > 0.99) & (made[1].face > 0.99) & (made[0].even.min(-1) > 0.02)
+    known = (made[0].skin > 0.99) & (made[1].skin > 0.99) & (made[0].even.min(-1) > 0.02)
     apart = np.log(made[1].even[known]) - np.log(made[0].even[known])
     lit = np.log(made[0].even[known])
     assert known.sum() > 2000 and lit.std() > 0.15 and (apart - np.median(apart, 0)).std() < 0.1 * lit.std()

@@ -56,7 +56,7 @@ def test_a_picture_is_its_albedo_times_the_shading_of_even_skin(seen):
     on_head = made.head > 0.5
     clean = images.linear_to_srgb(made.albedo * made.even)
     assert np.abs(clean - made.srgb)[on_head].mean() < 0.05  # noise, blur and compression lie between
-    assert made.face[~on_head].max() == 0
+    assert made.skin[~on_head].max() == 0
 
 
 def test_what_turns_away_from_the_only_lamp_is_in_its_shadow(seen):

@@ -69,7 +69,7 @@ def blotches(sight: Sight, rng: np.random.Generator) -> np.ndarray:
 
 
 def _pair(seed: int, kind: str, group: str, first: Portrait, second: Portrait) -> Pair:
-    skin = cv2.erode((np.minimum(first.face, second.face) > 0.9).astype(np.uint8), np.ones((5, 5))) > 0
+    skin = cv2.erode((np.minimum(first.skin, second.skin) > 0.9).astype(np.uint8), np.ones((5, 5))) > 0
     levels = np.stack([images.srgb_to_linear(each.srgb) for each in (first, second)])
     lit = (levels.min((0, 3)) > LIT[0]) & (levels.max((0, 3)) < LIT[1])
     return Pair(f"{seed} {kind}", kind, group, (first.srgb, second.srgb), (first.albedo, second.albedo), skin & lit)

@@ -127,6 +127,7 @@ def portray(
         strong,
         skin,
         skin,
+        skin,
         _fitted(stage, environment, lamps, tone * gains, rng),
     )
 
