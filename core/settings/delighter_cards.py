@@ -92,8 +92,8 @@ CARDS = {
     "opendelight": Card(
         "OpenDelight",
         "The published delighting network of the paper OpenDelight, where you have its weights.",
-        best_for="Comparing, and whoever has the weights.",
-        runs="On your machine; a GPU is of great help.",
+        best_for="Comparing, if you have the weights.",
+        runs="On your machine; a GPU helps a lot.",
         weights="You provide them: the folder with the authors' two files. It was not verified on real weights.",
         licence="Our code GPL-3.0-or-later; the weights are under their authors' terms.",
         settings=("checkpoint",),

@@ -19,7 +19,7 @@ from core.capture.files import replacing
 from core.face import template
 from core.face.faces import LEFT_EYE, RIGHT_EYE
 from core.geometry import raster
-from core.geometry.meshes import unit
+from core.geometry.meshes import Mesh, unit
 from core.geometry.views import View
 
 from .cameras import hold_camera, pinhole_view
@@ -117,39 +117,73 @@ def trace_sight(
     Maps: diffuse [M, M, 3], linear albedo; gloss [M, M], reflectance at normal incidence; relief [M, M, 3], unit,
     tangent space, OpenGL Y+.
     """
-    mesh, caster = stage.mesh, raster.RayCaster(stage.mesh)
+    hits = find_hits(stage.mesh, stage.normals, raster.RayCaster(stage.mesh), view)
+    albedo, shine = raster.sample_uv(diffuse, hits.uv), raster.sample_uv(gloss, hits.uv)
+    masks = np.stack([raster.sample_uv(template.mask(name, 512), hits.uv) for name in MASKS], 1)
+    normal = _with_relief(hits.smooth, _tangents(stage)[hits.face], raster.sample_uv(relief, hits.uv))
+    if open_eyes:
+        _open_eyes(stage, view, hits.hit, albedo, shine, masks, rng)
+    return make_sight(hits, albedo, shine, normal, masks, rng)
+
+
+@dataclass(frozen=True)
+class Hits:
+    """Pixels of a square view that show a head.
+
+    hit bool [S, S]; of its P pixels: face int [P], bary [P, 3], corner [P, 3] vertices, uv [P, 2], smooth [P, 3] unit
+    normals without relief, position [P, 3] in metres.
+    """
+
+    view: View
+    caster: raster.RayCaster
+    hit: np.ndarray
+    face: np.ndarray
+    bary: np.ndarray
+    corner: np.ndarray
+    uv: np.ndarray
+    smooth: np.ndarray
+    position: np.ndarray
+
+
+def find_hits(mesh: Mesh, normals: np.ndarray, caster: raster.RayCaster, view: View) -> Hits:
+    """Find where a view shows a head with vertex normals [V, 3]."""
     face, bary, _ = raster.render_view(caster, view)
     hit = face >= 0
     where, bary = face[hit], bary[hit]
     corner = mesh.faces[where]
     uv = (mesh.uvs[mesh.face_uvs[where]] * bary[..., None]).sum(1)
-    smooth = unit((stage.normals[corner] * bary[..., None]).sum(1))
+    smooth = unit((normals[corner] * bary[..., None]).sum(1))
     position = (mesh.vertices[corner] * bary[..., None]).sum(1)
-    albedo, shine = raster.sample_uv(diffuse, uv), raster.sample_uv(gloss, uv)
-    masks = np.stack([raster.sample_uv(template.mask(name, 512), uv) for name in MASKS], 1)
-    normal = _with_relief(smooth, _tangents(stage)[where], raster.sample_uv(relief, uv))
-    if open_eyes:
-        _open_eyes(stage, view, hit, albedo, shine, masks, rng)
-    lamps, radius = random_lamps(rng)
-    reach = np.stack(
-        [trace_sun(caster, position, smooth, lamp, r, RAYS, rng) for lamp, r in zip(lamps, radius, strict=True)]
-    )
+    return Hits(view, caster, hit, where, bary, corner, uv, smooth, position)
+
+
+def make_sight(
+    hits: Hits, albedo: np.ndarray, gloss: np.ndarray, normal: np.ndarray, masks: np.ndarray, rng: np.random.Generator
+) -> Sight:
+    """Return the sight of these pixels under random lamps, of which the rays are traced."""
+    view = hits.view
+    lamps, radius = _random_lamps(rng)
+    reach = [
+        trace_sun(hits.caster, hits.position, hits.smooth, lamp, r, RAYS, rng)
+        for lamp, r in zip(lamps, radius, strict=True)
+    ]
     y, x = np.mgrid[0 : view.height, 0 : view.width]
     rays = view.rays(np.stack([x.ravel(), y.ravel()], -1) + 0.5).reshape(view.height, view.width, 3)
-    vertices, local = np.unique(corner, return_inverse=True)
+    vertices, local = np.unique(hits.corner, return_inverse=True)
+    pixels = hits.bary, albedo, gloss, normal, hits.smooth, hits.position
     return Sight(
         view.width,
-        np.flatnonzero(hit).astype(np.int32),
+        np.flatnonzero(hits.hit).astype(np.int32),
         vertices.astype(np.int32),
-        local.reshape(corner.shape).astype(np.int32),
-        *(np.asarray(pixels, np.float32) for pixels in (bary, albedo, shine, normal, smooth, position)),
+        local.reshape(hits.corner.shape).astype(np.int32),
+        *(np.asarray(values, np.float32) for values in pixels),
         view.centre,
         view.rotation,
         rays.astype(np.float32),
         masks.astype(np.float32),
         lamps,
         radius,
-        reach,
+        np.stack(reach),
     )
 
 
@@ -174,7 +208,7 @@ def full(sight: Sight) -> Sight:
     return replace(sight, **single, reach=sight.reach.astype(np.float32) / 255)
 
 
-def random_lamps(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def _random_lamps(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Draw directions [LAMPS, 3] and angular radii [LAMPS] of lamps, mostly before and above the face."""
     towards = rng.normal(size=(LAMPS, 3)) * [1.0, 0.8, 0.7] + [0, -0.7, 0.5]
     return unit(towards), np.exp(rng.uniform(np.log(0.004), np.log(0.2), LAMPS))

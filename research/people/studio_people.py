@@ -28,8 +28,7 @@ from core.imaging.normalized_convolution import weighted_blur
 from core.light.skylight import radiance_transfer
 from core.stages.delight.photograph import fit_head
 
-from .olat import trace_sun
-from .sight import MASKS, RAYS, Sight, random_camera, random_lamps
+from .sight import MASKS, Sight, find_hits, make_sight, random_camera
 
 HEIGHT_PX = 900  # of the photograph as it is read; the face is some 290 wide
 FARTHEST_DEGREES = 24.0  # between the photograph's camera and a sight's
@@ -151,45 +150,18 @@ def sights(
     tone = np.median(albedo[sure & (portrait.parts["skin"] > 0.9)], 0)
     for _ in range(count):
         view = _camera_beside(portrait, size, rng)
-        face, bary, _ = raster.render_view(caster, view)
-        hit = face >= 0
-        where, bary = face[hit], bary[hit]
-        corner = portrait.mesh.faces[where]
-        smooth = unit((normals[corner] * bary[..., None]).sum(1))
-        position = (portrait.mesh.vertices[corner] * bary[..., None]).sum(1)
-        pixels, cosine, seen = _projected(portrait, position, smooth, caster)
-        share = raster.sample(weight, pixels) * seen * np.clip((cosine - LEAST_COSINE) / 0.1, 0, 1)
+        hits = find_hits(portrait.mesh, normals, caster, view)
+        pixels, cosine, seen = _projected(portrait, hits.position, hits.smooth, caster)
+        frontal = seen * np.clip((cosine - LEAST_COSINE) / 0.1, 0, 1)
+        colour = tone + frontal[:, None] * (raster.sample(_at_scale(albedo, portrait, view), pixels) - tone)
         parts = {name: raster.sample(picture, pixels) for name, picture in portrait.parts.items()}
-        blend = (seen * np.clip((cosine - LEAST_COSINE) / 0.1, 0, 1))[:, None]
-        colour = tone + blend * (raster.sample(_at_scale(albedo, portrait, view), pixels) - tone)
-        lamps, radius = random_lamps(rng)
-        reach = np.stack(
-            [trace_sun(caster, position, smooth, lamp, r, RAYS, rng) for lamp, r in zip(lamps, radius, strict=True)]
-        )
-        y, x = np.mgrid[0:size, 0:size]
-        rays = view.rays(np.stack([x.ravel(), y.ravel()], -1) + 0.5).reshape(size, size, 3)
-        vertices, local = np.unique(corner, return_inverse=True)
-        nothing = np.zeros(len(where), np.float32)
-        uv = (portrait.mesh.uvs[portrait.mesh.face_uvs[where]] * bary[..., None]).sum(1)
-        share = share * raster.sample_uv(template.mask("face", 512), uv)  # the neck's shape is not fitted to anything
+        # the neck's shape is not fitted to anything
+        share = raster.sample(weight, pixels) * frontal * raster.sample_uv(template.mask("face", 512), hits.uv)
         masks = {"face": share, "skin": parts["skin"] * share, "eyes": parts["eyes"], "lips": parts["lips"]}
+        nothing = np.zeros(len(share), np.float32)
         gloss = GLOSS + (EYE_GLOSS - GLOSS) * parts["eyes"]
-        colour = np.clip(colour, 3e-3, 0.95)
-        single = [np.asarray(pixels, np.float32) for pixels in (bary, colour, gloss, smooth, smooth, position)]
-        yield Sight(
-            size,
-            np.flatnonzero(hit).astype(np.int32),
-            vertices.astype(np.int32),
-            local.reshape(corner.shape).astype(np.int32),
-            *single,
-            view.centre,
-            view.rotation,
-            rays.astype(np.float32),
-            np.stack([masks.get(name, nothing) for name in MASKS], 1).astype(np.float32),
-            lamps,
-            radius,
-            reach,
-        )
+        masks = np.stack([masks.get(name, nothing) for name in MASKS], 1)
+        yield make_sight(hits, np.clip(colour, 3e-3, 0.95), gloss, hits.smooth, masks, rng)
 
 
 def _camera_beside(portrait: StudioPortrait, size: int, rng: np.random.Generator) -> View:
