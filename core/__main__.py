@@ -3,13 +3,16 @@
 """Command line: python -m core COMMAND.
 
 Like the add-on, it writes a job, starts the worker with this same Python and prints its messages. A failure is two
-lines, a problem and its remedy, and exit code 2; Ctrl-C ends with 130.
+lines, a problem and its remedy, and exit code 2; Ctrl-C ends with 130. Output that nobody can read ends quietly, with
+141 where a pipe was closed (as of `| head`, like a program that SIGPIPE ends) and 1 where it could not be written.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import os
+import shlex
 import signal
 import sys
 import tempfile
@@ -22,27 +25,43 @@ from .capture.capture import Capture
 from .capture.messages import Problem, Reporter
 from .settings import delighter_cards, delivery_presets, settings
 from .worker import capture_commands, command_settings, read_only, self_test, setup_commands, terminal
-from .worker.commands import add_command
+from .worker.commands import add_command, path_of
 from .worker.job import last_settings, wait_until_free, write_job
+from .worker.output import OutputLost, let_go, open_streams
 
 ROOT = Path(__file__).resolve().parent.parent
+SUFFIX = ".wildcap"
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run one command line; return its exit code: 0, 2 for a problem, 130 after Ctrl-C."""
-    arguments = sys.argv[1:] if arguments is None else arguments
-    for stream in (sys.stdout, sys.stderr):  # a log on Windows does not take every character
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")
+    """Run one command line; return its exit code: 0, 2 for a problem, 130 after Ctrl-C, or OutputLost's."""
+    open_streams()
     try:
-        options = _parser().parse_args(arguments)
+        code = _carry_out(sys.argv[1:] if arguments is None else arguments)
+        sys.stdout.flush()
+        return code
+    except OutputLost as lost:
+        let_go()
+        return lost.code
+
+
+def _carry_out(arguments: list[str]) -> int:
+    try:
+        try:
+            options = _parser().parse_args(arguments)
+        except SystemExit:
+            sys.stdout.flush()  # the help
+            raise
         return options.command(options) or 0
     except KeyboardInterrupt:
         return 130
+    except OutputLost:
+        raise
     except Exception as error:  # a traceback would not help the user
         if not isinstance(error, Problem):
             error = unforeseen.explain(error, "the command", _log_of(arguments))
-        print(error.problem, error.remedy, sep="\n", file=sys.stderr)
+        with contextlib.suppress(OSError):  # nobody reads that either
+            print(error.problem, error.remedy, sep="\n", file=sys.stderr)
         return 2
 
 
@@ -82,10 +101,12 @@ def _parser() -> argparse.ArgumentParser:
 def _add_run(commands) -> None:
     run = add_command(commands, "run", _run, "run the chain; a second run continues where the first stopped")
     run.add_argument(
-        "source", metavar="SOURCE", help="a video, or a folder of photographs; - for the one the capture was made from"
+        "source",
+        metavar="SOURCE",
+        help="a video, a photograph, or a folder of photographs; - for the one the capture was made from",
     )
     run.add_argument(
-        "capture", metavar="CAPTURE", type=Path, help="the face's folder, usually NAME.wildcap; created if missing"
+        "capture", metavar="CAPTURE", type=path_of, help="the face's folder, usually NAME.wildcap; created if missing"
     )
     run.add_argument(
         "--from", dest="first", metavar="STAGE", help="begin with this stage and run it even if nothing has changed"
@@ -133,17 +154,40 @@ def _run(options: argparse.Namespace) -> int:
     command_settings.refuse_lone_flags(options, run_settings)
     # a shell has its background jobs ignore this signal, which means cancel here
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    capture = Capture(options.capture)
+    capture, source = Capture(options.capture), os.path.expanduser(options.source)
+    _refuse_exchanged(source, options.capture)
     wait_until_free(capture, lambda text: print(text, flush=True))
     job = write_job(
         capture,
-        source="" if options.source == "-" else options.source,
+        source="" if source == "-" else source,
         first=options.first,
         last=options.last,
         settings=run_settings,
         quality=options.quality,
     )
     return terminal.follow(ROOT, capture, job, consent.by_flag(capture) if options.send_frames else {})
+
+
+def _refuse_exchanged(source: str, capture: Path) -> None:
+    """Raise Problem for a source that is a capture, or a capture that is a file: the arguments were exchanged."""
+    is_capture, is_video = Capture(source).json.is_file(), capture.is_file()
+    photographs = is_capture and capture.is_dir() and any(capture.iterdir()) and not Capture(capture).json.is_file()
+    if photographs or is_video and (is_capture or source.endswith(SUFFIX) or not Path(source).exists()):
+        raise Problem(
+            f"SOURCE and CAPTURE are exchanged: {capture} is {'a file' if is_video else 'a folder of pictures'}, and "
+            f"{source} the face's folder.",
+            f"Write the video first: `python -m core run {shlex.join([str(capture), source])}`.",
+        )
+    if is_video:
+        raise Problem(
+            f"{capture} is a file; the capture is a folder, in which the face is kept.",
+            f"Name a new folder after the video, such as {capture.stem}{SUFFIX}.",
+        )
+    if is_capture:
+        raise Problem(
+            f"{source} is a capture, not a video or a folder of photographs.",
+            f"To continue it, write `python -m core run - {shlex.quote(source)}`.",
+        )
 
 
 def _deliver(options: argparse.Namespace) -> int:

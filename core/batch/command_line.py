@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import shlex
 import signal
 import sys
 from collections import Counter
@@ -22,7 +23,7 @@ from ..capture.files import storage_problem
 from ..capture.messages import Cancelled, Failed, Problem
 from ..settings import settings
 from ..worker import command_settings
-from ..worker.commands import add_command
+from ..worker.commands import add_command, path_of
 from ..worker.terminal import ProgressLine, print_message
 from .gate import accept_mask
 from .groups import GROUPS, group_named
@@ -31,7 +32,7 @@ from .lines import list_flamenco_jobs, list_tasks
 from .local import CANCELLED, run_local
 from .record import GATES, NAME, Batch, read_batch, write_batch
 from .review import list_riskiest, write_review
-from .shots import HEADINGS, read_faces
+from .shots import HEADINGS, choose_tones, read_faces
 from .state import DONE, STOPPED, WAITING, derive_state
 from .task import ROOT, run_task
 
@@ -63,12 +64,12 @@ def add_commands(commands) -> None:
 def _add_plan(batch) -> None:
     plan = add_command(batch, "plan", _plan, "make a batch from a table or a folder of videos, or add new ones to it")
     shots = f"a CSV with the columns {', '.join(HEADINGS)}, of which only video is required; or a folder"
-    plan.add_argument("shots", metavar="SHOTS", type=Path, help=shots)
-    plan.add_argument("batch", metavar="BATCH", type=Path, help="the batch's folder, with a capture for each face")
+    plan.add_argument("shots", metavar="SHOTS", type=path_of, help=shots)
+    plan.add_argument("batch", metavar="BATCH", type=path_of, help="the batch's folder, with a capture for each face")
     plan.add_argument("--quality", choices=settings.QUALITIES, default="standard")
     plan.add_argument("--gate", choices=GATES, help="artist: solve a face only after its shadow mask was accepted")
     plan.add_argument("--deliver", metavar="PRESET", help="deliver each head (`presets` lists them); none: stop that")
-    plan.add_argument("--to", metavar="FOLDER", type=Path, help="folder of the deliveries, by default the captures")
+    plan.add_argument("--to", metavar="FOLDER", type=path_of, help="folder of the deliveries, by default the captures")
     plan.add_argument("--blender", metavar="PROGRAM", help="a Blender that renders contact sheets; none: stop that")
     command_settings.add_assignments(plan, "run")
 
@@ -86,6 +87,11 @@ def _add_run(batch, name: str, words: str) -> None:
 
 
 def _plan(options: argparse.Namespace) -> int:
+    if options.batch.is_file():
+        raise Problem(
+            f"{options.batch} is a file; BATCH is a folder, in which the captures are kept.",
+            f"The table comes first: `python -m core batch plan {shlex.quote(str(options.batch))} BATCH`.",
+        )
     root = options.batch.absolute()
     before = read_batch(root) if (root / NAME).is_file() else Batch(root, ())
     _refuse_strangers(root)
@@ -96,6 +102,7 @@ def _plan(options: argparse.Namespace) -> int:
     kept = [face for face in before.faces if face.name not in {new.name for new in faces}]
     if faces or kept:
         write_batch(replace(batch, faces=(*kept, *faces)))
+        choose_tones(faces, before.faces)
     for fault in faults:
         print(f"{fault.problem} {fault.remedy}", file=sys.stderr)
     summary = f"{len(faces)} face{'' if len(faces) == 1 else 's'} planned in {root}"

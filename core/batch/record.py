@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ..capture import tone_choice
 from ..capture.capture import Capture
 from ..capture.files import write_json
 from ..capture.json_files import plain_name, read_json
@@ -44,9 +45,16 @@ class BatchFace:
     def capture(self) -> Capture:
         return Capture(self.root)
 
+    def wanted(self) -> dict:
+        """Return its settings as a job has them, with the skin tone that was chosen since it was planned."""
+        choice = tone_choice.read_choice(self.capture)
+        if choice is None:
+            return self.settings
+        return {**self.settings, "solve": {**self.settings.get("solve", {}), "skin_tone": choice}}
+
     def chosen(self) -> Settings:
-        """Return the settings that its stages are judged by."""
-        return from_json(self.settings, preset(self.quality))
+        """Return the settings that its stages are judged by. Raises Problem for a damaged choice of a skin tone."""
+        return from_json(self.wanted(), preset(self.quality))
 
 
 @dataclass(frozen=True)
@@ -136,5 +144,5 @@ def _parse_face(root: Path, record: dict) -> BatchFace:
         record["quality"],
         convert_settings(record["settings"], lambda path: str(read_portable(path, root))),
     )
-    face.chosen()
+    from_json(face.settings, preset(face.quality))
     return face

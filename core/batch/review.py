@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """review.html: the faces of a batch on one page, in the order in which to look at them.
 
-Stopped faces come first, then those that wait for the artist, then the others; within each, the riskiest first. A
-measure of a face is ranked by the share of the other faces that are better, as no thresholds have been measured. The
-worst rank of a face is its risk, since one failure spoils a head and a mean would hide it; the mean breaks ties.
+Faces whose skin tone is open come first, then stopped ones, those that wait for the artist, and the others; within
+each, the riskiest first. A measure of a face is ranked by the share of the other faces that are better, as no
+thresholds have been measured. The worst rank of a face is its risk, since one failure spoils a head and a mean would
+hide it; the mean breaks ties.
 
 Pictures are embedded as thumbnails: the page loads nothing and can be sent.
 """
@@ -22,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .. import __version__
-from ..capture import report
+from ..capture import report, tone_choice
 from ..capture.capture import Capture
 from ..capture.files import replacing, storage_problem
 from ..capture.messages import Problem
@@ -83,13 +84,22 @@ THUMBNAIL_PX, QUALITY = 160, 80
 TALLEST_REM = 10
 """Greatest height on the page: as many pixels as a thumbnail has."""
 ORDER = (STOPPED, WAITING)
-HEADINGS = {STOPPED: "Stopped", WAITING: "Waiting for the artist", "": "The others, the riskiest first"}
+TONE = "tone"
+HEADINGS = {
+    TONE: "Choose the skin tone",
+    STOPPED: "Stopped",
+    WAITING: "Waiting for the artist",
+    "": "The others, the riskiest first",
+}
 STATES = {DONE: "done", TO_DO: "to do", WORKING: "being worked on", WAITING: "waiting", STOPPED: "stopped"}
 
 
 @dataclass(frozen=True)
 class ReviewRow:
-    """One face: values and ranks (share of the others that are better, [0, 1]) by a measure's label, and findings."""
+    """One face: values and ranks (share of the others that are better, [0, 1]) by a measure's label, and findings.
+
+    is_tone_open: the estimate of the skin tone spans more swatches than it may, and nobody has chosen one.
+    """
 
     face: BatchFace
     state: FaceState
@@ -97,6 +107,7 @@ class ReviewRow:
     values: dict[str, float]
     ranks: dict[str, float]
     findings: list[dict]
+    is_tone_open: bool = False
 
     @property
     def risk(self) -> tuple[float, float]:
@@ -109,7 +120,9 @@ class ReviewRow:
         return max(self.ranks, key=self.ranks.__getitem__, default="") if self.risk[0] > 0 else ""
 
     def words(self) -> str:
-        """Return the worst measure as in "mask 43 %, worse than 98 % of the others"."""
+        """Return the worst measure as in "mask 43 %, worse than 98 % of the others", or what is to be chosen."""
+        if self.is_tone_open:
+            return "its skin tone waits to be chosen"
         if not self.worst:
             return "nothing is worse than in the others"
         others = "all others" if self.risk[0] == 1 else f"{self.risk[0]:.0%} of the others"
@@ -149,7 +162,9 @@ def write_review(batch: Batch) -> tuple[Path, list[ReviewRow]]:
 
 def _heading(row: ReviewRow) -> str:
     """Return the key of a row's section in HEADINGS."""
-    return row.state.state if row.state.state in ORDER else ""
+    if row.state.state in ORDER:
+        return row.state.state
+    return TONE if row.is_tone_open else ""
 
 
 def _is_ours(path: Path) -> bool:
@@ -162,18 +177,20 @@ def _is_ours(path: Path) -> bool:
 
 def read_rows(batch: Batch) -> list[ReviewRow]:
     """Read the captures' records, in the batch's order; a record that cannot be read counts as empty."""
-    records, measured, found = [], [], []
+    records, measured, found, tones = [], [], [], []
     for face in batch.faces:
-        record = {"stages": {}}
+        record, is_tone_open = {"stages": {}}, False
         with contextlib.suppress(Problem):
             record = face.capture.read()
+            is_tone_open = tone_choice.asks_for_choice(record, face.chosen().solve.skin_tone)
+        tones.append(is_tone_open)
         findings = [finding for finding in report.findings(record) if not finding["stopped"]]
         records.append(record["stages"])
         measured.append(_measure(record["stages"], len(findings)))
         found.append(findings)
     return [
         ReviewRow(face, derive_state(batch, face), sum(entry["seconds"] for entry in stages.values()), *rest)
-        for face, stages, *rest in zip(batch.faces, records, measured, rank(measured), found, strict=True)
+        for face, stages, *rest in zip(batch.faces, records, measured, rank(measured), found, tones, strict=True)
     ]
 
 

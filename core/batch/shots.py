@@ -3,7 +3,8 @@
 """Faces of a batch from a table of shots or a folder of videos; a row that cannot be used is reported by its line.
 
 The table is CSV as spreadsheets write it, with commas, semicolons or tabs, and a line of headings: video, and any of
-name, tone, white, template, quality, settings. Relative paths begin at the table's folder. Standard library only.
+name, tone, white, torch, template, colour, quality, settings. Relative paths begin at the table's folder. Standard
+library only.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import unicodedata
 from collections.abc import Iterable
 from pathlib import Path
 
+from ..capture import tone_choice
 from ..capture.files import storage_problem
 from ..capture.json_files import plain_name
 from ..capture.messages import Problem
@@ -24,7 +26,13 @@ from ..settings.setting_values import absolute_path
 from ..worker.command_settings import read_file
 from .record import NAME, BatchFace
 
-COLUMNS = {"tone": ("solve", "skin_tone"), "white": ("solve", "white_point"), "template": ("registration", "template")}
+COLUMNS = {
+    "tone": ("solve", "skin_tone"),
+    "white": ("solve", "white_point"),
+    "torch": ("delight", "torch"),
+    "template": ("registration", "template"),
+    "colour": ("frames", "colour"),
+}
 """Columns that set one setting: (stage, name)."""
 HEADINGS = ("video", "name", *COLUMNS, "quality", "settings")
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm", ".mts", ".3gp")
@@ -68,6 +76,19 @@ def read_faces(
             f"A folder holds videos or folders of photographs; a table has a line of headings: {', '.join(HEADINGS)}.",
         )
     return faces, faults
+
+
+def choose_tones(faces: Iterable[BatchFace], planned: Iterable[BatchFace]) -> None:
+    """Make a skin tone that differs from what was `planned` before the choice of the captures that exist.
+
+    The others get it with their first job. Raises Problem if it cannot be written.
+    """
+    stage, setting = COLUMNS["tone"]
+    before = {face.name: face.settings.get(stage, {}).get(setting, "auto") for face in planned}
+    for face in faces:
+        tone = face.settings.get(stage, {}).get(setting, "auto")
+        if tone != before.get(face.name, "auto") and face.capture.json.is_file():
+            tone_choice.write_choice(face.capture, tone)
 
 
 def _fold(folder: Path) -> str:
@@ -161,7 +182,9 @@ def _face(row: dict[str, str], folder: Path, root: Path, quality: str, shared: d
             "A cell that holds the separator is put in quotation marks, as a tone is: \"0.8,0.6,0.5\".",
         )
     if not row.get("video"):
-        raise Problem("It names no video.", "Name a video or a folder of photographs in the column video.")
+        raise Problem(
+            "It names no video.", "Name a video, a photograph or a folder of photographs in the column video."
+        )
     source = Path(absolute_path(row["video"], folder.absolute()))
     if not source.exists():
         raise Problem(

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..capture import delivery_plan, lease
+from ..capture import delivery_plan, lease, provenance, tone_choice
 from ..capture.capture import Capture
 from ..capture.files import storage_problem
 from ..capture.freshness import FINISHED
@@ -93,18 +93,27 @@ def deliver_settings(batch: Batch, face: BatchFace) -> dict:
 
 
 def is_delivered(batch: Batch, face: BatchFace) -> bool:
-    """Return whether the delivery is complete and made from the current stages. Raises Problem for invalid settings."""
-    plan = delivery_plan.plan(face.capture, from_json(deliver_settings(batch, face)).deliver)
+    """Return whether the delivery is complete, of the current stages and skin tone. Raises Problem."""
+    settings = from_json(deliver_settings(batch, face))
+    plan = delivery_plan.plan(face.capture, settings.deliver)
     try:
-        provenance = read_json(plan.target / delivery_plan.PROVENANCE)
-        made_from = {name: done["finished"] for name, done in provenance["stages"].items()}
-        now = {name: done["finished"] for name, done in face.capture.read()["stages"].items()}
-        return made_from == now and all((plan.target / name).is_file() for name in provenance["files"])
+        delivered = read_json(plan.target / delivery_plan.PROVENANCE)
+        made_from = {name: done["finished"] for name, done in delivered["stages"].items()}
+        record = face.capture.read()
+        now = {name: done["finished"] for name, done in record["stages"].items()}
+        change = tone_choice.find_change(record, settings.solve.skin_tone)
+        tone = provenance.describe_tone(change)
+        return (
+            made_from == now
+            and delivered.get("skin_tone") == tone
+            and all((plan.target / name).is_file() for name in delivered["files"])
+        )
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return False
 
 
 def has_sheet(capture: Capture) -> bool:
-    """Return whether there is a contact sheet that is not older than the maps it shows."""
+    """Return whether there is a contact sheet that is not older than the maps and the skin tone it shows."""
     sheet, maps = capture.renders / SHEET, capture.maps_4k / "diffuse_albedo.png"
-    return sheet.is_file() and maps.is_file() and sheet.stat().st_mtime >= maps.stat().st_mtime
+    shown = [maps, *(path for path in (capture.skin_tone,) if path.is_file())]
+    return sheet.is_file() and maps.is_file() and sheet.stat().st_mtime >= max(path.stat().st_mtime for path in shown)

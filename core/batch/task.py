@@ -53,12 +53,12 @@ def run_task(
             )
         wait_until_free(capture, lambda text: hear(Log(text)), cancelled)
         source = face.source if group is GROUPS[0] else ""
-        final = follow(write_job(capture, source=source, last=group.last, settings=face.settings, quality=face.quality))
+        final = follow(write_job(capture, source=source, last=group.last, settings=face.wanted(), quality=face.quality))
         if group.name == DELIVER and isinstance(final, Done) and batch.deliver is not None:
             if not is_delivered(batch, face):
                 final = follow(write_job(capture, tool="deliver", settings=deliver_settings(batch, face)))
                 # `status` and Blender judge the stages by job.json
-                write_job(capture, last=group.last, settings=face.settings, quality=face.quality)
+                write_job(capture, last=group.last, settings=face.wanted(), quality=face.quality)
         if group.name == DELIVER and isinstance(final, Done) and batch.blender and not has_sheet(capture):
             final = _render_sheet(batch.blender, capture, hear, cancelled)
     except CancelledError:

@@ -28,10 +28,12 @@ class FrameRecord:
     """One frame; None means not known.
 
     name: its file in frames/. video_frame: number in the video, or order among the photographs. source: a photograph's
-    own name. size: width, height. selected: used for the texture. face_box: left, top, right, bottom. face_score, blur:
-    in [0, 1]. yaw_deg: turn of the head. brightness, noise: in sRGB. clipped: share of pixels. eyes_open: height over
-    width of the right and left eye. other_face: prominence of a second face. gain: factors of linear R, G, B that even
-    out the exposure.
+    own name, below the source's folder. size: width, height. selected: used for the texture. face_box: left, top,
+    right, bottom. face_score, blur: in [0, 1]. yaw_deg: turn of the head. brightness, noise: in sRGB. clipped: share of
+    pixels. eyes_open: height over width of the right and left eye. other_face: prominence of a second face. zoom:
+    magnification of a film's lens relative to its first frame; frames of one zoom share a camera. gain: factors of
+    linear R, G, B that even out the exposure. focal_source, focal_deviation: tags that state focal_px, and the
+    deviation of its log; focal_doubt: why a tag is not believed.
     """
 
     name: str
@@ -45,6 +47,7 @@ class FrameRecord:
     face_score: float = 0.0
     yaw_deg: float | None = None
     focal_px: float | None = None
+    zoom: float = 1.0
     blur: float = 0.0
     brightness: float = 0.0
     clipped: float = 0.0
@@ -53,6 +56,9 @@ class FrameRecord:
     blink: bool = False
     other_face: float = 0.0
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    focal_source: str = ""
+    focal_deviation: float = 0.0
+    focal_doubt: str = ""
 
     @property
     def shown(self) -> str:
@@ -60,7 +66,10 @@ class FrameRecord:
         return self.source or self.name
 
 
-KEYS = {field.name for field in fields(FrameRecord)}
+ONLY_IF_TOLD = {"focal_source", "focal_deviation", "focal_doubt", "zoom"}
+"""Keys that only photographs with metadata and zoomed films have."""
+DEFAULTS = {field.name: field.default for field in fields(FrameRecord)}
+KEYS = {*DEFAULTS}
 
 
 @dataclass(frozen=True)
@@ -90,7 +99,11 @@ def read_frames(capture: Capture) -> Frames:
 def write_frames(folder: Path, frames: Frames) -> None:
     """Write frames.json into the folder of the frames."""
     kind = {} if frames.kind is None else {"kind": frames.kind}
-    write_json(folder / "frames.json", {**kind, "frames": [asdict(record) for record in frames.records]})
+    entries = [
+        {key: value for key, value in asdict(record).items() if key not in ONLY_IF_TOLD or value != DEFAULTS[key]}
+        for record in frames.records
+    ]
+    write_json(folder / "frames.json", {**kind, "frames": entries})
 
 
 def _parse(entry: dict) -> FrameRecord:
@@ -139,6 +152,7 @@ _CHECKS = {
     "face_score": is_number,
     "yaw_deg": _optional(is_number),
     "focal_px": _optional(_at_least(0)),
+    "zoom": lambda value: is_number(value, 0) and value > 0,
     "blur": _is_measure,
     "brightness": _is_measure,
     "clipped": _is_measure,
@@ -147,5 +161,8 @@ _CHECKS = {
     "blink": _is_bool,
     "other_face": is_number,
     "gain": _tuple_of(3),
+    "focal_source": lambda value: isinstance(value, str),
+    "focal_deviation": _at_least(0),
+    "focal_doubt": lambda value: isinstance(value, str),
 }
 """Attribute -> check of a value from the file."""

@@ -65,7 +65,7 @@ def judge_stage(root: Path, record: dict, stage: Stage, settings: Settings) -> V
 
 
 def source_of(root: Path, record: dict) -> Path | None:
-    """Return the recorded path of the video or the folder of photographs."""
+    """Return the recorded path of the video, the photograph or the folder of photographs."""
     return read_portable(record["source"], root) if record.get("source") else None
 
 

@@ -11,14 +11,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
+from .photographs import list_photographs
 from .regular_files import require_regular
 
 WHOLE_BYTES = 64 << 20
 """Size up to which `sample_file` reads all: every photograph, and half a minute of a phone's video."""
 BLOCKS, BLOCK_BYTES = 64, 1 << 20
 """Blocks read of a larger file, spread evenly from its first byte to its last."""
-PHOTOGRAPHS = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr", ".heic", ".heif")
-"""Suffixes read from a folder of photographs."""
 LITTER = frozenset({"thumbs.db", "desktop.ini"})
 """Files that Windows leaves in a folder of pictures."""
 DIGEST_BYTES = 16
@@ -69,10 +68,12 @@ def hash_source(source: Path | None) -> list:
     """Return [name, size, `sample_file`] of the video, or of each photograph in the folder; [] if it is gone."""
     if source is None:
         return []
-    files = [source]
-    if source.is_dir():
-        files = [p for p in sorted(source.iterdir()) if p.name.lower().endswith(PHOTOGRAPHS) and p.name[0] != "."]
-    return [[path.name, path.stat().st_size, sample_file(path)] for path in files if path.is_file()]
+    if not source.exists():
+        return []
+    photographs = list_photographs(source)
+    return [
+        [photographs.name(path), path.stat().st_size, sample_file(path)] for path in photographs.files if path.is_file()
+    ]
 
 
 def same_source(recorded: list, present: list) -> bool:

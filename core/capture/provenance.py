@@ -25,14 +25,24 @@ from .code_key import data_files
 from .delivery_plan import MADE_BY, PROVENANCE, DeliveryPlan
 from .files import write_json
 from .hashes import hash_source, same_source
+from .tone_choice import ToneChange
 
 HERE = Path(__file__).parents[1]
 CHUNK_BYTES = 1 << 22  # read at once
 
 
-def collect(capture: Capture, plan: DeliveryPlan, settings: Settings, tick: Callable[[], None]) -> dict:
-    """Return the content of provenance.json but for the delivered files. `tick` is called often, and may raise."""
-    record = capture.read()
+def collect(
+    capture: Capture,
+    plan: DeliveryPlan,
+    settings: Settings,
+    tick: Callable[[], None],
+    change: ToneChange | None = None,
+) -> dict:
+    """Return the content of provenance.json but for the delivered files.
+
+    `change` is what was baked into the skin after the solve; `tick` is called often, and may raise.
+    """
+    record, tone = capture.read(), describe_tone(change)
     return {
         "made_by": MADE_BY,
         "written": time.strftime("%Y-%m-%dT%H:%M:%S"),
@@ -49,6 +59,7 @@ def collect(capture: Capture, plan: DeliveryPlan, settings: Settings, tick: Call
         "versions": {"WildCap": __version__, "Python": platform.python_version(), "packages": _packages()},
         "capture": {"name": capture.root.name, "sources": _sources(capture.source, record, tick)},
         "stages": {name: _stage(done) for name, done in record["stages"].items()},
+        **({} if tone is None else {"skin_tone": tone}),
         "weights": _weights(record, settings, tick),
         "data": {
             "built-in head": "MakeHuman base mesh and targets, CC0",
@@ -57,6 +68,13 @@ def collect(capture: Capture, plan: DeliveryPlan, settings: Settings, tick: Call
         "licence": "The maps and meshes are yours. WildCap for Blender is GPL-3.0-or-later, which does not reach what "
         "it makes.",
     }
+
+
+def describe_tone(change: ToneChange | None) -> dict | None:
+    """Return what a delivery tells of a skin tone that was chosen after the solve; None if none was."""
+    if change is None:
+        return None
+    return {"solved_srgb": list(change.solved), "chosen_srgb": list(change.chosen), "baked_into": "skin"}
 
 
 def finish(folder: Path, **versions: str) -> None:

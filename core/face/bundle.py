@@ -181,7 +181,50 @@ def _offset_weight() -> float:
     return INDEPENDENT_LANDMARKS / len(template_landmarks().mean)
 
 
+def focal_deviation(bundle: Bundle, observations: Observations) -> np.ndarray:
+    """Return the deviations [G] of the logs of the focal lengths, by the inverse of the normal equations.
+
+    They grow with the misses of the observations where these are larger than expected.
+    """
+    weights = _weights(bundle, observations)
+    u, _, v, _, w = _normal_equations(bundle, observations, weights)
+    folded = np.einsum("pij,pjs->pis", np.linalg.inv(v + 1e-6 * np.eye(3)), w)
+    covariance = np.linalg.inv(u - w.reshape(-1, len(u)).T @ folded.reshape(-1, len(u)) + 1e-9 * np.eye(len(u)))
+    lenses = 6 * len(bundle.rotations) + np.arange(len(bundle.focal))
+    error = ((bundle.project(observations.camera, observations.point) - observations.pixel) ** 2).sum(1)
+    freedom = max(1, 2 * len(error) - len(u) - 3 * len(np.unique(observations.point)))
+    return np.sqrt(np.diag(covariance)[lenses] * max(1.0, weights @ error / freedom))
+
+
 def _step(bundle: Bundle, observations: Observations, weights: np.ndarray, damping: float) -> Bundle:
+    views, groups = len(bundle.rotations), len(bundle.focal)
+    u, g, v, h, w = _normal_equations(bundle, observations, weights)
+    shared = len(u)
+    tail, lenses = slice(6 * views + groups, shared), np.arange(6 * views, 6 * views + groups)
+    u[np.diag_indices(shared)] *= 1 + damping
+    u[np.diag_indices(shared)] += 1e-9
+    v += damping * np.eye(3) * np.trace(v, axis1=1, axis2=2)[:, None, None] / 3 + 1e-6 * np.eye(3)
+    inverse = np.linalg.inv(v)
+    folded = np.einsum("pij,pjs->pis", inverse, w)
+    reduced = u - w.reshape(-1, shared).T @ folded.reshape(-1, shared)
+    step = -np.linalg.solve(reduced, g - np.einsum("pis,pi->s", folded, h))
+    points = bundle.points - np.einsum("pij,pj->pi", inverse, h) - folded @ step
+    turns = step[: 6 * views].reshape(views, 6)
+    rotations = np.array(
+        [cv2.Rodrigues(turn[:3])[0] @ rotation for turn, rotation in zip(turns, bundle.rotations, strict=True)]
+    )
+    return replace(
+        bundle,
+        rotations=rotations,
+        translations=bundle.translations + turns[:, 3:],
+        points=points,
+        focal=bundle.focal * np.exp(np.clip(step[lenses], -0.3, 0.3)),
+        coefficients=bundle.coefficients + step[tail],
+    )
+
+
+def _normal_equations(bundle: Bundle, observations: Observations, weights: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return u [S, S], g [S] of cameras, lenses and identity, v [P, 3, 3], h [P, 3] of points, and w [P, 3, S]."""
     model = template_landmarks()
     marks, count, views, groups = len(model.mean), len(bundle.points), len(bundle.rotations), len(bundle.focal)
     shared = 6 * views + groups + len(bundle.coefficients)
@@ -229,24 +272,4 @@ def _step(bundle: Bundle, observations: Observations, weights: np.ndarray, dampi
     lenses = np.arange(6 * views, 6 * views + groups)
     u[lenses, lenses] += 1 / bundle.focal_spread**2
     g[lenses] += focal_off / bundle.focal_spread
-
-    u[np.diag_indices(shared)] *= 1 + damping
-    u[np.diag_indices(shared)] += 1e-9
-    v += damping * np.eye(3) * np.trace(v, axis1=1, axis2=2)[:, None, None] / 3 + 1e-6 * np.eye(3)
-    inverse = np.linalg.inv(v)
-    folded = np.einsum("pij,pjs->pis", inverse, w)
-    reduced = u - w.reshape(-1, shared).T @ folded.reshape(-1, shared)
-    step = -np.linalg.solve(reduced, g - np.einsum("pis,pi->s", folded, h))
-    points = bundle.points - np.einsum("pij,pj->pi", inverse, h) - folded @ step
-    turns = step[: 6 * views].reshape(views, 6)
-    rotations = np.array(
-        [cv2.Rodrigues(turn[:3])[0] @ rotation for turn, rotation in zip(turns, bundle.rotations, strict=True)]
-    )
-    return replace(
-        bundle,
-        rotations=rotations,
-        translations=bundle.translations + turns[:, 3:],
-        points=points,
-        focal=bundle.focal * np.exp(np.clip(step[lenses], -0.3, 0.3)),
-        coefficients=bundle.coefficients + step[tail],
-    )
+    return u, g, v, h, w

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,12 @@ megapixels."""
 MOST_VALUE_CD_M2 = 2e9
 """The brightest value in physical units is the sun's disc, 1.6e9 cd/m2; the square of more would overflow."""
 MOST_HALF_FLOAT = 65504.0
+LOST_DATA = "premature end", "bad huffman code", "instead of rst", "bad arithmetic code", "inconsistent progression"
+"""libjpeg's words of data that cannot be decoded; it fills the rest with grey, even before a proper end."""
+END_OF_IMAGE, MOST_PADDING, PADDING_SHARE = 0xD9, 16, 0.01
+"""Bytes that libjpeg may skip before a marker within the picture, and, as a share of the file, before its end, where
+cameras pad."""
+COPY_ANEW = "Part of its data is lost: copy it from the camera or a backup again."
 SAVE_ANEW = "Save it again as PNG, JPEG or EXR."
 
 
@@ -48,22 +55,33 @@ def open_picture(path: Path) -> oiio.ImageInput:
     return image
 
 
-def read_pixels(path: Path) -> tuple[np.ndarray, int]:
-    """Return the stored values float32 [H, W, C] and the EXIF orientation (1: upright).
+def read_pixels(path: Path) -> tuple[np.ndarray, oiio.ImageSpec]:
+    """Return the stored values float32 [H, W, C], not yet upright, and the header.
 
-    Raises Problem for a file that is cut off or damaged, and for values that are not finite.
+    Raises Problem for a file that is cut off or has lost data, and for values that are not finite.
     """
     image = open_picture(path)
     pixels = image.read_image(oiio.FLOAT)
-    error, orientation = image.geterror(), image.spec().getattribute("Orientation")
+    error, spec, is_jpeg = image.geterror(), image.spec(), image.format_name() == "jpeg"
     image.close()
-    jpeg = Path(path).suffix.lower() in (".jpg", ".jpeg")
-    if pixels is None or error and (not jpeg or "Premature end" in error):  # libjpeg also reports harmless things
+    if pixels is None or error and not is_jpeg:
         raise _unreadable(path, error)
-    fault = find_fault(pixels, MOST_VALUE_CD_M2)
+    if error and _has_lost_data(error, Path(path).stat().st_size):
+        raise _unreadable(path, error, COPY_ANEW)
+    stores_floats = spec.format in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
+    fault = find_fault(pixels, MOST_VALUE_CD_M2) if stores_floats or not pixels.size else ""
     if fault:
         raise Problem(f"{path} holds {fault}.", advise_remaking(path, SAVE_ANEW))
-    return pixels, orientation if isinstance(orientation, int) else 1  # text in a damaged file
+    return pixels, spec
+
+
+def _has_lost_data(error: str, size: int) -> bool:
+    """Return whether libjpeg's warning, of a file of `size` bytes, tells of lost data and not of harmless padding."""
+    extraneous = re.search(r"(\d+) extraneous bytes before marker 0x(\w\w)", error)
+    if extraneous:
+        count, marker = int(extraneous[1]), int(extraneous[2], 16)
+        return count > (PADDING_SHARE * size if marker == END_OF_IMAGE else MOST_PADDING)
+    return any(words in error.lower() for words in LOST_DATA)
 
 
 def check_written(path: Path, pixels: np.ndarray, half: bool) -> None:
@@ -91,6 +109,6 @@ def find_fault(pixels: np.ndarray, most: float) -> str:
     return f"values as large as {max(high, -low):g}" if max(high, -low) > most else ""
 
 
-def _unreadable(path: Path, error: str) -> Problem:
+def _unreadable(path: Path, error: str, remedy: str = SAVE_ANEW) -> Problem:
     reason = (error.strip() or "damaged").splitlines()[0].rstrip(".")
-    return Problem(f"{path} is not a readable picture ({reason}).", advise_remaking(path, SAVE_ANEW))
+    return Problem(f"{path} is not a readable picture ({reason}).", advise_remaking(path, remedy))

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Picture files and colour spaces. OpenImageIO reads and writes everything but HEIC, which heif.py reads.
+"""Picture files and colour spaces, by OpenImageIO; heif.py reads HEIC, raw.py raw photographs.
+
+A file's first bytes say what it is, and it says itself what its colours are; its suffix decides what is written.
 
 Arrays are float32, rows from the top, [H, W, C]. *sRGB* is encoded by the IEC 61966-2-1 curve in [0, 1]; *linear* is
 scene or reflectance values with the same primaries; *data* is neither (masks, normals, specular).
@@ -20,17 +22,25 @@ import OpenImageIO as oiio
 
 from ..capture.files import replacing
 from ..capture.messages import Problem
+from ..capture.picture_kinds import HEIF, JPEG, PNG, RAW, kind_of
 from ..capture.stages import advise_remaking
-from . import heif
-from .checks import MOST_PICTURE_BYTES, SAVE_ANEW, check_written, open_picture, read_pixels
+from . import colours, exif, focal, heif, jpeg_damage, raw
+from .checks import COPY_ANEW, MOST_PICTURE_BYTES, SAVE_ANEW, check_written, open_picture, read_pixels
+from .colours import Colour
+from .colours import linear_to_srgb as linear_to_srgb  # where everybody looks for them
+from .colours import srgb_to_linear as srgb_to_linear
 
 EXIF = {
-    heif.FOCAL_LENGTH: "FocalLength",
-    heif.FOCAL_35MM: "FocalLengthIn35mmFilm",
-    heif.PLANE_RESOLUTION: "FocalPlaneXResolution",
-    heif.PLANE_UNIT: "FocalPlaneResolutionUnit",
-    heif.WIDTH: "PixelXDimension",
-    heif.HEIGHT: "PixelYDimension",
+    exif.MAKE: "Make",
+    exif.FOCAL_LENGTH: "Exif:FocalLength",
+    exif.FOCAL_35MM: "Exif:FocalLengthIn35mmFilm",
+    exif.PLANE_RESOLUTION: "Exif:FocalPlaneXResolution",
+    exif.PLANE_UNIT: "Exif:FocalPlaneResolutionUnit",
+    exif.WIDTH: "Exif:PixelXDimension",
+    exif.HEIGHT: "Exif:PixelYDimension",
+    exif.EXPOSURE_TIME: "ExposureTime",
+    exif.F_NUMBER: "FNumber",
+    exif.SENSITIVITY: "Exif:PhotographicSensitivity",
 }
 """EXIF tag -> OpenImageIO's name of it."""
 TURNS = {
@@ -68,37 +78,59 @@ class _Encoding:
     small: bool = False
 
 
-def srgb_to_linear(srgb: np.ndarray) -> np.ndarray:
-    """Decode sRGB, any shape; negative values stay negative."""
-    srgb = np.asarray(srgb, np.float32)
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((np.maximum(srgb, 0) + 0.055) / 1.055) ** 2.4).astype(np.float32)
-
-
-def linear_to_srgb(linear: np.ndarray) -> np.ndarray:
-    """Encode linear values as sRGB, any shape, clipped to [0, 1]."""
-    linear = np.clip(np.asarray(linear, np.float32), 0, 1)
-    return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear ** (1 / 2.4) - 0.055).astype(np.float32)
-
-
 def read_srgb(path: Path) -> np.ndarray:
     """Return a picture as sRGB [H, W, 3], upright."""
-    pixels = _rgb(read_data(path))
-    return linear_to_srgb(pixels) if is_linear(path) else pixels
+    stored, colour = read_stored(path)
+    return colour.to_srgb(stored)
 
 
 def read_linear(path: Path) -> np.ndarray:
     """Return a picture as linear [H, W, 3]."""
-    pixels = _rgb(read_data(path))
-    return pixels if is_linear(path) else srgb_to_linear(pixels)
+    stored, colour = read_stored(path)
+    return colour.to_linear(stored)
+
+
+def read_stored(path: Path, thorough: bool = False) -> tuple[np.ndarray, Colour]:
+    """Return the stored R, G, B [H, W, 3], upright, and the colour that the file states.
+
+    `thorough`: refuse also a JPEG with damage that its decoder does not notice.
+    """
+    pixels, colour = _read(Path(path), thorough)
+    rgb = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, 2)
+    return np.ascontiguousarray(rgb), colour
 
 
 def read_data(path: Path) -> np.ndarray:
     """Return the stored values [H, W, C], upright, integers scaled to [0, 1]."""
-    if heif.is_heif(path):
-        return heif.read_pixels(path, MOST_PICTURE_BYTES)
-    pixels, orientation = read_pixels(Path(path))
-    transposed, rows, columns = TURNS.get(orientation, TURNS[1])
-    return np.ascontiguousarray((pixels.swapaxes(0, 1) if transposed else pixels)[::rows, ::columns])
+    return _read(Path(path))[0]
+
+
+def _read(path: Path, thorough: bool = False) -> tuple[np.ndarray, Colour]:
+    kind = kind_of(path)
+    if kind == HEIF:
+        return heif.read_pixels(path, MOST_PICTURE_BYTES), heif.read_colour(path)
+    if kind == RAW:
+        return raw.read_pixels(path, MOST_PICTURE_BYTES), Colour()
+    pixels, spec = read_pixels(path)
+    if thorough and kind == JPEG and jpeg_damage.is_damaged(pixels, path):
+        raise Problem(f"{path} is a damaged picture: its blocks are shifted from one on.", COPY_ANEW)
+    orientation = spec.getattribute("Orientation")
+    # text in a damaged file
+    transposed, rows, columns = TURNS.get(orientation if isinstance(orientation, int) else 1, TURNS[1])
+    upright = np.ascontiguousarray((pixels.swapaxes(0, 1) if transposed else pixels)[::rows, ::columns])
+    return upright, _stated_colour(path, kind, spec)
+
+
+def _stated_colour(path: Path, kind: str, spec: oiio.ImageSpec) -> Colour:
+    if kind == PNG:
+        return colours.of_png(path)
+    profile = spec.getattribute("ICCProfile")
+    if profile is not None:
+        return colours.of_profile(bytes(np.asarray(profile, np.uint8)))
+    if spec.format in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE):
+        names = (spec.getattribute(name) for name in ("colorInteropID", "oiio:ColorSpace"))
+        return colours.of_exr(spec.getattribute("chromaticities"), *names)
+    return Colour()
 
 
 def read_normals(path: Path) -> np.ndarray:
@@ -124,12 +156,15 @@ def luma(srgb: np.ndarray) -> np.ndarray:
 
 
 def is_linear(path: Path) -> bool:
-    """Return whether a file stores linear floats (EXR, HDR) and not sRGB."""
+    """Return whether a file is written as linear floats (EXR, HDR) and not as sRGB."""
     return Path(path).suffix.lower() in (".exr", ".hdr")
 
 
 def size(path: Path) -> tuple[int, int]:
     """Return width and height as stored, from the header alone."""
+    reader = {HEIF: heif, RAW: raw}.get(kind_of(path))
+    if reader:
+        return reader.size(path)
     image = open_picture(path)
     width, height = image.spec().width, image.spec().height
     image.close()
@@ -144,31 +179,28 @@ def bits(path: Path) -> int:
     return 8 * size
 
 
-def read_focal_35mm(path: Path) -> float | None:
-    """Return the focal length in mm of 35 mm film, by the diagonal, from a photograph's EXIF, or None."""
-    if heif.is_heif(path):
-        return heif.focal_35mm(heif.read_exif(path), *heif.size(path))
+def read_metadata(path: Path) -> tuple[focal.Focal, float | None]:
+    """Return the focal length by a photograph's EXIF, and the natural log of its exposure, up to a constant."""
+    tags, width, height = _read_exif(Path(path))
+    return focal.read(tags, width, height), exif.log_exposure(tags)
+
+
+def _read_exif(path: Path) -> tuple[dict[int, float | str], int, int]:
+    """Return the EXIF of a picture by its tags, and its width and height."""
+    reader = {HEIF: heif, RAW: raw}.get(kind_of(path))
+    if reader:
+        return reader.read_exif(path), *reader.size(path)
     image = oiio.ImageInput.open(str(path))
     if image is None:
-        return None
+        return {}, 0, 0
     spec = image.spec()
-    values = {tag: spec.getattribute(f"Exif:{name}") for tag, name in EXIF.items()}
+    values = {tag: spec.getattribute(name) for tag, name in EXIF.items()}
     image.close()
     # a manual lens states 0/0
     tags = {tag: float(value) for tag, value in values.items() if isinstance(value, int | float) and np.isfinite(value)}
-    return heif.focal_35mm(tags, spec.width, spec.height)
-
-
-def read_profile(path: Path) -> str:
-    """Return the name of the colour profile in a picture ("Display P3"), or ""."""
-    if heif.is_heif(path):
-        return heif.read_profile(path)
-    image = oiio.ImageInput.open(str(path))
-    if image is None:
-        return ""
-    name = image.spec().getattribute("ICCProfile:profile_description")
-    image.close()
-    return name or ""
+    if isinstance(values[exif.MAKE], str):
+        tags[exif.MAKE] = values[exif.MAKE]
+    return tags, spec.width, spec.height
 
 
 def write_packed(path: Path, channels: np.ndarray, bits: int = 8, srgb: bool = False) -> None:
@@ -214,10 +246,6 @@ def resize(image: np.ndarray, width: int, height: int) -> np.ndarray:
     """Resample [H, W(, C)]: area averaging to shrink, Lanczos to enlarge."""
     shrinks = width * height < image.shape[0] * image.shape[1]
     return cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LANCZOS4)
-
-
-def _rgb(pixels: np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, 2))
 
 
 def _write(path: Path, pixels: np.ndarray, encoding: _Encoding, check: Callable[[], None] = lambda: None) -> None:

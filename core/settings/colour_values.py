@@ -10,17 +10,24 @@ from ..capture.messages import Problem
 
 TONE_DECIMALS = 4
 """Decimals of a skin tone's sRGB channels everywhere: typing a tone that was shown gives the same maps."""
+SWATCHES = 10
+"""Swatches of skin that a tone may be chosen from by number: 1 is the lightest (skin_swatches.py)."""
+LUMINANCE_WEIGHTS = (0.2126, 0.7152, 0.0722)
+"""Of linear sRGB (Rec.709)."""
 Colour = tuple[float, float, float]
 
 
-def parse_skin_tone(text: str) -> Colour | None:
-    """Parse three shares (0.69,0.54,0.46), three 8-bit values (176,138,118), #B08A76 or B08A76; None for auto.
+def parse_skin_tone(text: str) -> Colour | int | None:
+    """Parse three shares (0.69,0.54,0.46), three 8-bit values (176,138,118), #B08A76, B08A76, or a swatch (6).
 
-    Returns encoded sRGB in (0, 1], rounded to TONE_DECIMALS. Raises Problem for anything else.
+    Returns encoded sRGB in (0, 1], rounded to TONE_DECIMALS, or the swatch's number from 1 to SWATCHES, whose colour
+    depends on the person's hue; None for auto. Raises Problem for anything else.
     """
     text = text.strip()
     if text == "auto":
         return None
+    if re.fullmatch("[0-9]{1,2}", text) and 1 <= int(text) <= SWATCHES:
+        return int(text)
     if re.fullmatch("#?[0-9a-fA-F]{6}", text):
         channels = [byte / 255 for byte in bytes.fromhex(text.removeprefix("#"))]
     else:
@@ -31,7 +38,8 @@ def parse_skin_tone(text: str) -> Colour | None:
     if len(channels) != 3 or not all(0 < channel <= 1 for channel in channels):
         raise Problem(
             f"The skin tone {text!r} is not a colour.",
-            "Write it in sRGB as 0.69,0.54,0.46, as 176,138,118 or as #B08A76, or write auto.",
+            "Write it in sRGB as 0.69,0.54,0.46, as 176,138,118 or as #B08A76, as the number of a swatch from "
+            f"1 (light) to {SWATCHES} (dark), or write auto.",
         )
     return tuple(channels)
 
@@ -39,6 +47,11 @@ def parse_skin_tone(text: str) -> Colour | None:
 def format_skin_tone(srgb) -> str:
     """Write encoded sRGB, three numbers, as `parse_skin_tone` reads it."""
     return ",".join(f"{channel:.{TONE_DECIMALS}f}" for channel in srgb)
+
+
+def to_linear(colour) -> Colour:
+    """Decode three channels of sRGB to linear light."""
+    return tuple(v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in colour)
 
 
 def describe_estimate(deviation: float | None) -> tuple[str, str]:

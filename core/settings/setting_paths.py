@@ -45,3 +45,20 @@ def _check(name: str, field: Field, value: str) -> None:
         raise Problem(f"{path}, the value of {setting}, contains no {missing[0]}.", advice)
     if name == "solve.together":
         captures_in(value)
+    if name == "registration.template":
+        check_template(path)
+
+
+def check_template(path: Path) -> None:
+    """Raise Problem for a path that is neither an OBJ nor a folder with a neutral one, beside its shapes."""
+    if not (path.is_file() and path.suffix.lower() == ".obj" or path.is_dir()):
+        raise Problem(
+            f"{path} is neither an OBJ nor a folder.",
+            "Choose an OBJ of a head, or a folder with a neutral OBJ and its shapes.",
+        )
+    shapes = (*path.glob("*.obj"), *path.glob("*/*.obj")) if path.is_dir() else ()
+    if path.is_dir() and not any("neutral" in file.name.lower() for file in shapes):
+        raise Problem(
+            f"{path} contains no OBJ with 'neutral' in its name.",
+            "Choose the OBJ itself, or the folder of shapes (FaceXModel in ICT-FaceKit).",
+        )

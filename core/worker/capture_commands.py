@@ -14,7 +14,7 @@ from pathlib import Path
 from ..capture import artist_landmarks, deletion, report, stages
 from ..capture.capture import Capture
 from ..capture.messages import Problem
-from .commands import add_command
+from .commands import add_command, path_of, refuse_exchanged
 from .job import last_settings
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -27,12 +27,12 @@ def add_commands(commands) -> None:
     delete.add_argument("--yes", action="store_true", help="delete it, for good")
     words = "write a zip to send: logs, versions, settings; no pictures, names or paths"
     about = add_command(commands, "report-problem", _report_problem, words)
-    about.add_argument("capture", metavar="CAPTURE", type=Path, nargs="?")
-    about.add_argument("--to", metavar="ZIP", type=Path, required=True)
+    about.add_argument("capture", metavar="CAPTURE", type=path_of, nargs="?")
+    about.add_argument("--to", metavar="ZIP", type=path_of, required=True)
     mask = commands.add_parser("mask", help="import a painted shadow mask")
     mask = mask.add_subparsers(required=True, metavar="import")
     bring = add_command(mask, "import", _mask_import, "use a picture as the shadow mask: white is shadow", "CAPTURE")
-    bring.add_argument("picture", metavar="PNG", type=Path)
+    bring.add_argument("picture", metavar="PNG", type=path_of)
     marks = commands.add_parser("landmarks", help="set landmarks by hand, in place of the detected ones")
     marks = marks.add_subparsers(required=True, metavar="set|free|import")
     put = add_command(marks, "set", _landmarks, "set one landmark in the capture's world", "CAPTURE")
@@ -43,7 +43,7 @@ def add_commands(commands) -> None:
     free.add_argument("index", metavar="INDEX")
     words = 'read landmarks from a JSON file: {"points": {"152": [x, y, z]}}, metres'
     many = add_command(marks, "import", _landmarks, words, "CAPTURE")
-    many.add_argument("file", metavar="JSON", type=Path)
+    many.add_argument("file", metavar="JSON", type=path_of)
 
 
 def _status(options: argparse.Namespace) -> int:
@@ -99,11 +99,14 @@ def _report_problem(options: argparse.Namespace) -> int:
 def _mask_import(options: argparse.Namespace) -> int:
     from ..imaging.mask_import import import_mask  # needs OpenImageIO
 
+    refuse_exchanged(options.capture, options.picture, "mask import")
     print(f"{import_mask(Capture(options.capture), options.picture)} is now the shadow mask; solve comes next.")
     return 0
 
 
 def _landmarks(options: argparse.Namespace) -> int:
+    if "file" in options:
+        refuse_exchanged(options.capture, options.file, "landmarks import")
     if "file" in options and not options.file.is_file():
         raise Problem(f"There is no file at {options.file}.", "Check its name.")
     position = (options.x, options.y, options.z) if "x" in options else None

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..capture import stages
+from ..capture import stages, tone_choice
 from ..capture.capture import Capture
 from ..capture.files import write_json
 from ..capture.json_files import read_json
@@ -26,7 +26,7 @@ class JobRequest:
     """A parsed job file."""
 
     capture: Capture
-    source: str  # a video or a folder of photographs; '' for the capture's own
+    source: str  # a video, a photograph or a folder of them; '' for the capture's own
     chain: tuple[stages.Stage, ...]
     force: bool  # run fresh stages as well
     settings: Settings
@@ -45,14 +45,18 @@ def write_job(
 ) -> Path:
     """Write the capture's job.json and return its path.
 
-    Without a `source`, a video or a folder of photographs, the capture's own is used. The job runs the stages `first`
+    Without a `source`, a video or photographs, the capture's own is used. The job runs the stages `first`
     to `last`, forced; without `first` it begins with the first and skips fresh ones. `settings` ({stage: {name: value},
-    seed, device}) lie over the preset `quality`. `tool`, one of stages.TOOLS, runs instead of the chain.
+    seed, device}) lie over the preset `quality`. `tool`, one of stages.TOOLS, runs instead of the chain. A skin tone in
+    the settings becomes the capture's choice; without one, its choice is used.
 
     Raises Problem for an invalid name or value, if the folder cannot be written, and while another worker is at the
     capture, whose record job.json is.
     """
+    choice = tone_choice.read_choice(capture)
     chosen = convert_settings(settings or {}, lambda path: write_portable(path, capture.root))
+    if choice is not None:
+        chosen["solve"] = {"skin_tone": choice, **chosen.get("solve", {})}
     job = {
         "capture": ".",
         "source": write_portable(source, capture.root) if str(source) else "",
@@ -68,6 +72,7 @@ def write_job(
         capture.refuse_inside(source)
     capture.claim()
     capture.check_free()
+    tone_choice.write_choice(capture, chosen.get("solve", {}).get("skin_tone", "auto"))
     write_json(capture.job, job)
     return capture.job
 
@@ -98,14 +103,21 @@ def read_job(path: Path) -> JobRequest:
 
 
 def last_settings(capture: Capture) -> Settings:
-    """Return the settings of the last job, by which stages are judged, or the defaults. Raises Problem."""
-    return read_job(capture.job).settings if capture.job.is_file() else Settings()
+    """Return the settings of the last job, by which stages are judged, or the defaults; and the chosen skin tone.
+
+    Raises Problem.
+    """
+    settings = read_job(capture.job).settings if capture.job.is_file() else Settings()
+    choice = tone_choice.read_choice(capture)
+    return settings if choice is None else from_json({"solve": {"skin_tone": choice}}, settings)
 
 
 def _check_names(root: Path, source: str | Path) -> None:
     """Raise Problem for a name that is not UTF-8, of the capture, its source or a photograph: JSON cannot hold it."""
     try:
         inside = os.listdir(source) if str(source) and os.path.isdir(source) else []
+        folders = [os.path.join(source, name) for name in inside if os.path.isdir(os.path.join(source, name))]
+        inside += [name for folder in folders for name in os.listdir(folder)]  # a rig's cameras
     except OSError as error:
         raise Problem(
             f"{source} cannot be read ({error.strerror}).",

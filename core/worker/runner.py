@@ -16,7 +16,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from .. import __version__
-from ..capture import report, unforeseen
+from ..capture import report, tone_choice, unforeseen
+from ..capture.capture import Capture
 from ..capture.files import storage_problem
 from ..capture.freshness import FINISHED, OLDER
 from ..capture.messages import (
@@ -31,7 +32,7 @@ from ..capture.messages import (
     StageDone,
     out_of_memory,
 )
-from ..capture.stages import Stage
+from ..capture.stages import TOOLS, Stage
 from ..settings.setting_paths import check_paths
 from ..settings.settings import Settings
 from .job import JobRequest, read_job
@@ -69,6 +70,8 @@ def run_job(
             if outdated:
                 words = f"Made by older code and kept: {', '.join(outdated)}. "
                 emit(Log(f"{words}Run a stage again to have it made by WildCap {__version__}."))
+            if tone_choice.find_change(job.capture.read(), job.settings.solve.skin_tone) is not None:
+                emit(Log("Another skin tone was chosen since the solve: what is shown and delivered has it."))
     except CancelledError:
         return Cancelled(stage)
     except Exception as error:
@@ -99,6 +102,7 @@ def run_stage(stage: Stage, job: JobRequest, emit: Callable[[Message], None], ca
             missing = [name for name in stage.writes if not capture.has(name)]
             if missing:
                 raise RuntimeError(f"the stage {stage.name} ended without writing {missing[0]}")
+            _add_estimate(stage, capture, settings, reporter)
             seconds = time.monotonic() - started
             capture.finish(stage, conditions, seconds, settings, reporter.figures, __version__, reporter.findings)
             report.write(capture, settings)
@@ -109,6 +113,31 @@ def run_stage(stage: Stage, job: JobRequest, emit: Callable[[Message], None], ca
             raise
     emit(StageDone(stage.name, round(seconds, 2), False, reporter.figures))
     return state
+
+
+def _add_estimate(stage: Stage, capture: Capture, settings: Settings, reporter: Reporter) -> None:
+    """Add the figures of what a stage estimates. Nobody has asked for it, so a failure is a line of the log."""
+    tool = next((tool for tool in TOOLS if tool.name == stage.estimates), None)
+    if tool is None:
+        return
+    aside = Reporter(stage.name, cancelled=lambda: _is_cancelled(reporter))
+    try:
+        _room(tool).run(capture, settings, aside)
+    except CancelledError:
+        raise
+    except Exception as error:
+        reporter.log(f"{tool.label} was not estimated: {error}")
+        return
+    reporter.figures.update(aside.figures)
+
+
+def _is_cancelled(reporter: Reporter) -> bool:
+    """Return whether the user has cancelled what a reporter reports of."""
+    try:
+        reporter.check()
+    except CancelledError:
+        return True
+    return False
 
 
 def _run_tool(tool: Stage, job: JobRequest, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
@@ -147,7 +176,7 @@ def _take_source(job: JobRequest, emit: Callable[[Message], None]) -> None:
     previous = capture.source
     source = Path(job.source) if job.source else previous
     if source is None:
-        raise Problem("This capture has no video yet.", "Choose a video or a folder of photographs.")
+        raise Problem("This capture has no video yet.", "Choose a video, a photograph or a folder of photographs.")
     if not source.exists():
         if job.force or not capture.has(first.writes[0]) or first.name not in capture.read()["stages"]:
             raise Problem(
@@ -174,13 +203,27 @@ def _take_source(job: JobRequest, emit: Callable[[Message], None]) -> None:
 
 
 def _check_paths(job: JobRequest) -> None:
-    """Raise Problem, before any stage runs, for missing files in the settings of stages that are not finished."""
+    """Raise Problem, before any stage runs, for missing files in the settings of stages that are not finished.
+
+    The authors' prior works in the UVs of a template that is fitted beside it.
+    """
     for step in job.chain:
         try:
             check_paths(job.settings, [step.name])
         except Problem:
             if job.force or job.capture.state(step, job.settings) not in FINISHED:
                 raise
+    stages = {step.name: step for step in job.chain}
+    if (
+        job.settings.solve.prior
+        and not job.settings.registration.template
+        and {"registration", "solve"} <= stages.keys()
+        and job.capture.state(stages["solve"], job.settings) not in FINISHED
+    ):
+        raise Problem(
+            "The authors' prior (--prior) works in the UVs of ICT-FaceKit, and no template is to be fitted.",
+            "Choose ICT-FaceKit's folder as well (--template), or leave the prior empty to use ours.",
+        )
 
 
 def _check_device(device: str) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from ..capture.messages import Done, Failed, Problem, Progress
 from . import index, installation, locks, wheels
 from .background import BackgroundTask
-from .commands import add_command
+from .commands import add_command, path_of
 from .environment import answer, python_of
 
 REQUIREMENTS = Path(__file__).resolve().parents[2] / "requirements"
@@ -25,8 +25,8 @@ POLL_S = 0.1  # between two looks at the installation
 def add_commands(commands) -> None:
     """Add the commands to the subparsers of `python -m core`."""
     install = add_command(commands, "install", _install, "make the solver's environment from this Python")
-    install.add_argument("folder", metavar="FOLDER", type=Path, help="new, empty, or one of an earlier installation")
-    install.add_argument("--wheels", metavar="FOLDER", type=Path, help="install from a folder of wheels, offline")
+    install.add_argument("folder", metavar="FOLDER", type=path_of, help="new, empty, or one of an earlier installation")
+    install.add_argument("--wheels", metavar="FOLDER", type=path_of, help="install from a folder of wheels, offline")
     _add_build(install)
     bring = add_command(commands, "wheels", _wheels, "download all wheels to install from offline", "FOLDER")
     names = f"{', '.join(locks.names())}; by default this machine and Python"

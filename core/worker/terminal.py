@@ -15,6 +15,7 @@ from ..capture.capture import Capture
 from ..capture.messages import Cancelled, Done, Failed, Log, Message, Progress, StageDone
 from .client import Worker
 from .job import read_job
+from .output import OutputLost
 
 POLL_S = 0.1  # between two looks at the job
 
@@ -39,6 +40,12 @@ def follow(root: Path, capture: Capture, job: Path, environment: dict[str, str])
         except KeyboardInterrupt:
             line.show("Cancelling ...")
             worker.cancel()
+        except OutputLost:
+            worker.cancel()  # it tidies up
+            while worker.running:
+                worker.poll()
+                time.sleep(POLL_S)
+            raise
 
 
 def print_message(message: Message, capture: Capture, line: ProgressLine) -> int:

@@ -83,7 +83,7 @@ def test_stages_lists_the_chain(capsys):
 def test_run_until_then_on_with_options_that_reach_the_stages(tiny_code, capture, film, tmp_path):
     place = tmp_path / "mine"
     place.mkdir()
-    for name in ("config.json", "ckpt.pth"):
+    for name in ("config.json", "ckpt.pth", "neutral.obj"):
         (place / name).touch()
     begun = core(tiny_code, "run", film, capture.root, "--until", "cameras", "--quality", "draft")
     assert begun.returncode == 0 and "Cameras      done in" in begun.stdout and "Scan" not in begun.stdout, begun.stderr
@@ -92,6 +92,8 @@ def test_run_until_then_on_with_options_that_reach_the_stages(tiny_code, capture
         *"--skin-tone 0.6,0.5,0.4 --delighter folder --seed 0 --quality draft --folder".split(),
         place,
         "--prior",
+        place,
+        "--template",
         place,
     ]
     ended = core(tiny_code, "run", "-", capture.root, *words)
@@ -105,11 +107,86 @@ def test_run_until_then_on_with_options_that_reach_the_stages(tiny_code, capture
     assert str(film) in status and status.count("done") == len(stages.STAGES)
 
 
-def test_what_a_later_stage_cannot_use_is_refused_before_the_first_one_runs(capture, film, refused):
-    assert "--template (registration.template)" in " ".join(
-        refused("run", film, capture.root, "--template", "gone.obj")
-    )
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--template", "gone.obj"), "--template (registration.template)"),
+        (("--template", "notes.txt"), "neither an OBJ nor a folder"),
+        (("--template", "empty"), "no OBJ with 'neutral'"),
+        (("--prior", "gone"), "--prior (solve.prior)"),
+        (("--prior", "prior"), "no template is to be fitted"),
+        (("--with", "empty"), "is not a capture"),
+        (("--cameras", "gone.xml"), "--cameras (cameras.import_from)"),
+        (("--delighter", "folder", "--folder", "gone"), "--folder (delight.folder)"),
+        (("--softened", "gone"), "--softened (shadow_mask.softened)"),
+        (("--set", "texture.perceptual=9", "--set", "texture.perceptual_network=gone"), "texture.perceptual_network"),
+        (("--set", "frames.colour=log"), "apple_log"),
+    ],
+)
+def test_what_a_later_stage_cannot_use_is_refused_before_the_first_one_runs(
+    capture, film, refused, words, told, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "notes.txt").touch()
+    for folder in ("empty", "prior"):
+        (tmp_path / folder).mkdir()
+    for name in ("config.json", "ckpt.pth"):
+        (tmp_path / "prior" / name).touch()
+    assert told in " ".join(refused("run", film, capture.root, *words))
     assert not capture.read()["stages"] and not (capture.root / "frames").exists()
+
+
+def test_exchanged_arguments_are_recognised(capture, film, refused, tmp_path):
+    photographs = tmp_path / "photographs"
+    photographs.mkdir()
+    (photographs / "1.jpg").touch()
+    for words in (("new.wildcap", film), (capture.root, film), (capture.root, photographs), ("gone", film)):
+        problem, remedy = refused("run", *words)
+        assert "exchanged" in problem and str(words[1]) in remedy.replace("'", "")
+    for command in ("mask", "landmarks"):
+        assert "exchanged" in refused(command, "import", film, capture.root)[0]
+    assert "table comes first" in refused("batch", "plan", tmp_path / "batch", film)[1]
+    assert "is a file" in refused("run", photographs, film)[0]
+    assert "run -" in refused("run", capture.root, tmp_path / "another.wildcap")[1]
+    assert film.read_bytes() == b"film"
+
+
+def test_a_home_in_quotes_is_a_home(capture, refused, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    assert command_line.main(["status", f"~/{capture.root.name}"]) == 0
+    capsys.readouterr()
+    assert str(tmp_path / "gone.mp4") in refused("run", "~/gone.mp4", "~/new.wildcap")[0]
+    assert (tmp_path / "new.wildcap").is_dir() and not (tmp_path / "~").exists()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no such pipes and devices there")
+@pytest.mark.parametrize("words", ["settings", "stages", "--help", "run --help"])
+@pytest.mark.parametrize(
+    ("shell", "code"),
+    [
+        ("{} | head -1 >/dev/null; exit ${{PIPESTATUS[0]}}", (0, 141)),
+        ("{} | true; exit ${{PIPESTATUS[0]}}", (0, 141)),
+        ("{} >/dev/full", (1,)),
+        ("{} >&-", (0,)),
+        ("{} >&- 2>&-", (0,)),
+    ],
+    ids=["head", "closed pipe", "full", "no output", "no output, no errors"],
+)
+def test_output_that_nobody_reads_ends_quietly(shell, code, words):
+    command = shell.format(f"{sys.executable} -B -m core {words}")
+    ended = subprocess.run(["bash", "-c", command], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert ended.returncode in code and ended.stderr == "", (ended.returncode, ended.stderr)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no such pipes there")
+def test_a_run_whose_output_is_closed_ends_its_worker(tiny_code, capture, film):
+    (capture.root / "mood.json").write_text('{"scan": "slow"}')
+    command = f"{sys.executable} -B -m core run '{film}' '{capture.root}' | head -1; exit ${{PIPESTATUS[0]}}"
+    ended = subprocess.run(["bash", "-c", command], cwd=tiny_code, capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 141 and ended.stderr == "", ended.stderr
+    assert not list(capture.root.glob(".scan*")) and "scan" not in capture.read()["stages"]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no other process can press Ctrl-C there")

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.capture import hashes
+from ...core.capture import photographs
 from ...core.capture.capture import Capture
 from ...core.capture.messages import Problem
 from .. import captures, preferences, problems
@@ -16,7 +16,7 @@ from ..base_operator import FileOperator
 from ..base_panel import WildcapPanel
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm")
-PHOTOGRAPHS = (*hashes.PHOTOGRAPHS, ".dng", ".avif")
+PHOTOGRAPHS = (*photographs.SUFFIXES, *photographs.UNREAD_SUFFIXES)
 """Formats that the stage frames reads, or explains how to convert."""
 WIDTH_PX = 240
 """Width of the file browser's sidebar, pixels."""
@@ -25,7 +25,7 @@ WIDTH_PX = 240
 class WILDCAP_OT_choose_video(FileOperator, bpy.types.Operator):
     """Choose the video of a face, or one of its photographs: all in that folder are used.
 
-    A capture folder is made for it.
+    A capture folder is made for it. A rig's folder holds one for each camera.
     """
 
     bl_idname = "wildcap.choose_video"
@@ -35,6 +35,11 @@ class WILDCAP_OT_choose_video(FileOperator, bpy.types.Operator):
     filepath: bpy.props.StringProperty(subtype='FILE_PATH', options={'SKIP_SAVE'})
     directory: bpy.props.StringProperty(subtype='DIR_PATH', options={'SKIP_SAVE', 'HIDDEN'})
     files: bpy.props.CollectionProperty(type=bpy.types.OperatorFileListElement, options={'SKIP_SAVE', 'HIDDEN'})
+    alone: bpy.props.BoolProperty(
+        name="Only This Photograph",
+        description="Make a draft from the chosen photograph alone, not from all in its folder",
+        options={'SKIP_SAVE'},
+    )
     filter_glob: bpy.props.StringProperty(
         default=";".join(f"*{s};*{s.upper()}" for s in VIDEOS + PHOTOGRAPHS), options={'HIDDEN'}
     )
@@ -46,6 +51,7 @@ class WILDCAP_OT_choose_video(FileOperator, bpy.types.Operator):
 
     def draw(self, context):
         """Draw the capture's place beside the file browser."""
+        self.layout.prop(self, "alone")
         folder = preferences.captures_folder()
         problems.draw_text(self.layout, iface_("The capture goes to {}.").format(folder), WIDTH_PX)
         if not bpy.data.filepath and folder == preferences.captures_default():
@@ -58,7 +64,7 @@ class WILDCAP_OT_choose_video(FileOperator, bpy.types.Operator):
     def work(self, context):
         folder = Path(bpy.path.abspath(self.directory))
         paths = [folder / file.name for file in self.files if file.name] if self.directory else []
-        for source in sources(paths or [Path(bpy.path.abspath(self.filepath or self.directory))]):
+        for source in sources(paths or [Path(bpy.path.abspath(self.filepath or self.directory))], self.alone):
             capture = Capture(new_folder(preferences.captures_folder(), source))
             capture.set_source(source)
             captures.add(context, capture.root)
@@ -85,23 +91,32 @@ class WILDCAP_FH_source(bpy.types.FileHandler):
         )
 
 
-def sources(files: list[Path]) -> list[Path]:
-    """Return the sources among chosen files: each video, and the folders of photographs. Raises Problem for others."""
+def sources(files: list[Path], alone: bool = False) -> list[Path]:
+    """Return the sources among chosen files: each video, and the folders of photographs, or each `alone`.
+
+    Raises Problem for others.
+    """
     paths = []
     for path in files:
         if not path.exists() or path == Path():
             raise Problem(f"There is no file or folder {path}.", "Choose a video, or a folder of photographs.")
-        if path.is_file() and path.suffix.lower() in PHOTOGRAPHS:
-            path = path.parent
-        elif path.is_file() and path.suffix.lower() not in VIDEOS:
-            raise Problem(
-                f"{path.name} is neither a video nor a photograph.",
-                f"Choose one of {', '.join(s[1:] for s in VIDEOS)}, or a folder of photographs.",
-            )
-        if path.is_dir() and not any(file.suffix.lower() in PHOTOGRAPHS for file in path.iterdir()):
+        if path.is_file() and path.suffix.lower() not in VIDEOS:
+            if not photographs.is_photograph(path):
+                raise Problem(
+                    f"{path.name} is neither a video nor a photograph.",
+                    f"Choose one of {', '.join(s[1:] for s in VIDEOS)}, or a folder of photographs.",
+                )
+            path = path if alone else path.parent
+        if path.is_dir() and not has_photographs(path):
             raise Problem(f"There are no photographs in {path}.", "Choose a video, or a folder of photographs.")
         paths.append(path.absolute())
     return list(dict.fromkeys(paths))
+
+
+def has_photographs(folder: Path) -> bool:
+    """Return whether a folder, or those of a rig's cameras in it, hold photographs."""
+    listed = photographs.list_photographs(folder)
+    return bool(listed.files or listed.unread)
 
 
 def new_folder(parent: Path, source: Path) -> Path:

@@ -4,10 +4,10 @@
 
 import bpy
 
-from . import choices, delighters, operators, panel, sending
+from . import choices, colours, delighters, operators, panel, sending
 
 _register, _unregister = bpy.utils.register_classes_factory(
-    (*operators.CLASSES, *choices.CLASSES, *sending.CLASSES, *panel.CLASSES)
+    (*operators.CLASSES, *choices.CLASSES, *colours.CLASSES, *sending.CLASSES, *panel.CLASSES)
 )
 
 

@@ -26,6 +26,15 @@ FOLDED = ("runs", "shadows", "weights", "licence")
 def draw(layout, item, width: int) -> None:
     """Draw the Delighter panel up to the wipe; delighters that lack something are greyed."""
     delighter = item.delight.delighter
+    torch = layout.split(factor=0.3)
+    torch.label(text="Torch")
+    torch.row(align=True).prop(item.delight, "torch", expand=True)
+    capture_status = status.of(item)
+    if capture_status is not None and capture_status.torch_percent is not None:
+        text = iface_("{} % of the light came from a torch. It was taken out.").format(capture_status.torch_percent)
+        problems.draw_text(layout, text, width, 'LIGHT_SPOT')
+    if item.delight.torch == "on":
+        return
     grid = layout.grid_flow(columns=COLUMNS, row_major=True, even_columns=True, align=True)
     for name in delighter_cards.choices():
         cell = grid.row(align=True)

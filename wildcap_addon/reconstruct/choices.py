@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 from ...core.capture.files import storage_problem
-from ...core.capture.messages import Problem
+from ...core.settings.setting_paths import check_template
 from .. import captures
 from ..base_operator import BaseOperator, CaptureOperator, FileOperator
 from . import delighters
@@ -79,17 +79,7 @@ class WILDCAP_OT_choose_template(FileOperator, CaptureOperator, bpy.types.Operat
 
     def work(self, context):
         path = Path(bpy.path.abspath(self.filepath)).absolute()
-        if not self.filepath or not (path.is_file() and path.suffix.lower() == ".obj" or path.is_dir()):
-            raise Problem(
-                f"{path} is neither an OBJ nor a folder.",
-                "Choose an OBJ of a head, or a folder with a neutral OBJ and its shapes.",
-            )
-        shapes = (*path.glob("*.obj"), *path.glob("*/*.obj")) if path.is_dir() else ()
-        if path.is_dir() and not any("neutral" in file.name.lower() for file in shapes):
-            raise Problem(
-                f"{path} contains no OBJ with 'neutral' in its name.",
-                "Choose the OBJ itself, or the folder of shapes (FaceXModel in ICT-FaceKit).",
-            )
+        check_template(path)
         captures.require(context).registration.template = str(path)
 
 

@@ -6,9 +6,9 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.capture import stages
-from .. import captures, problems
+from .. import captures, frame_icons, problems
 from ..base_panel import CapturePanel, draw_settings, region_width
-from . import card, delighters, landmarks
+from . import card, colours, delighters, landmarks
 
 
 class WILDCAP_PT_reconstruct(CapturePanel, bpy.types.Panel):
@@ -30,7 +30,24 @@ class WILDCAP_PT_reconstruct(CapturePanel, bpy.types.Panel):
         row.operator("wildcap.fit_landmarks")
         for stage in stages.STAGES[: stages.NAMES.index(stages.MASK_STAGE) + 1]:
             if stage.name != "delight":  # the Delighter panel has its settings
-                draw_settings(layout, item, stage, without=("template", "new_atlas"))
+                draw_settings(layout, item, stage, without=("template", "new_atlas", "colour"))
+
+
+class WILDCAP_PT_colour(CapturePanel, bpy.types.Panel):
+    bl_label = "Colour"
+    bl_parent_id = "WILDCAP_PT_reconstruct"
+
+    def draw(self, context):
+        layout = self.layout
+        item = captures.active(context)
+        layout.prop(item.frames, "colour", text="")
+        layout.operator("wildcap.preview_colours", icon='IMAGE_DATA')
+        previews = colours.previews(captures.folder(item))
+        grid = layout.grid_flow(row_major=True, columns=2, even_columns=True)
+        for choice, path in previews.items():
+            column = grid.column(align=True)
+            column.template_icon(icon_value=frame_icons.load(path), scale=5)
+            column.prop_enum(item.frames, "colour", choice)
 
 
 class WILDCAP_PT_head_mesh(CapturePanel, bpy.types.Panel):
@@ -70,4 +87,4 @@ class WILDCAP_PT_delighter(CapturePanel, bpy.types.Panel):
             layout.prop(context.window_manager, "wildcap_wipe", text=text, translate=False, slider=True)
 
 
-CLASSES = (WILDCAP_PT_reconstruct, WILDCAP_PT_head_mesh, WILDCAP_PT_delighter)
+CLASSES = (WILDCAP_PT_reconstruct, WILDCAP_PT_colour, WILDCAP_PT_head_mesh, WILDCAP_PT_delighter)

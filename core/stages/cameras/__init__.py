@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pycolmap
 
 from ...capture.capture import Capture
 from ...capture.files import replacing_folder
@@ -27,9 +28,15 @@ from .drawing import draw_cameras
 from .joint import AGREE_WIDTH_SHARES, WIDE_WIDTH_SHARES, refine
 from .landmarks import find_landmarks
 from .motion import expression_changes
-from .solving import LEAST_VIEWS, MOST_FACES, Solved, solve
+from .solving import FILM_AGAIN, LEAST_VIEWS, MOST_FACES, Solved, solve
 from .structure import ALL_PAIRS_FRAMES, solve_structure
 from .world import HeadFrame, find_head
+
+# COLMAP's messages go to the log of the worker, not to files among the system's temporary ones; a bundle adjustment of
+# pycolmap 4.2 sets the level back, but not the destinations
+pycolmap.logging.minloglevel = 2
+for level in (pycolmap.logging.INFO, pycolmap.logging.WARNING, pycolmap.logging.ERROR):
+    pycolmap.logging.set_log_destination(level, "")
 
 LEAST_COVERAGE_DEG = 15.0
 IMPORT_MISS_SHARE = 0.05
@@ -64,6 +71,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     centres = np.array([image.projection_center() for image in model.images.values() if image.has_pose])
     widest = coverage.widest_deg(centres)
     records = solved.to_place or frames.records
+    focal = [camera.mean_focal_length() for camera in model.cameras.values()]
+    if not np.isfinite([*centres.ravel(), *focal]).all():
+        raise Problem("The cameras that were found hold values that are not numbers.", FILM_AGAIN)
     if widest < LEAST_COVERAGE_DEG and frames.kind != PHOTOGRAPHS:
         raise Problem(
             f"The camera moved only {widest:.0f} degrees around the head; {LEAST_COVERAGE_DEG:.0f} are the least.",
@@ -84,7 +94,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         ("from_person_right_deg", round(float(-azimuth.min()), 1)),
         ("to_person_left_deg", round(float(azimuth.max()), 1)),
         ("landmark_error_px", round(solved.head.error_px, 2)),
-        ("focal_px", round(float(np.mean([c.mean_focal_length() for c in model.cameras.values()])), 1)),
+        ("focal_px", round(float(np.mean(focal)), 1)),
         ("features", solved.way),
         ("solve_s", round(time.monotonic() - started, 1)),
     ):
@@ -154,6 +164,12 @@ def _findings(solved: Solved, records: Sequence[FrameRecord], centres: np.ndarra
         report.finding(
             "The head moved against its background during the capture; only what matches on the head itself was used.",
             "Let the person lean the head against a wall or a chair, look at one point, and keep still.",
+        )
+    if solved.zoomed > 1:
+        report.finding(
+            f"The lens zoomed slowly while filming, by {100 * (solved.zoomed - 1):.0f} % or more. Each stretch got a "
+            "focal length of its own, which makes the cameras less sure.",
+            "Film with one lens, without zooming: move the camera instead.",
         )
     changes = expression_changes(solved.face_by_name)
     if len(changes) > 0.1 * len(solved.face_by_name):

@@ -19,6 +19,7 @@ from pathlib import Path
 import pycolmap
 
 from . import skeleton
+from .adjustment import adjust
 
 CHOSEN = "chosen.json"
 """Beside the database: the frames that carry a film of which matches are all that is wanted."""
@@ -34,14 +35,17 @@ at twice the frames' size."""
 LEAST_CARRIED_SHARE = 0.9
 """Share of the frames chosen to carry a film's structure that must fit together; else more are chosen."""
 
+MOST_POINT_ERROR_PX, LEAST_POINT_VIEWS = 1.5, 3
+"""Mean error and number of views of the points that a film of several lenses is adjusted by."""
+
 
 def reconstruct(job: dict) -> bool:
     """Run a job and write the largest model to its output; return False if there is none.
 
-    The job holds images (folder), groups [{names, width, height, focal_px or null}] of one camera each, skin (feature
-    settings for low contrast), film (a skeleton.Film; null: match all pairs), photographs (few, of straight lenses with
-    any focal length), finer (detect features from twice the size on), seed, masks (folder or null), database and output
-    (paths; a null output asks for matches only).
+    The job holds images (folder), groups [{names, width, height, focal_px or null, zoom}] of one camera each, skin
+    (feature settings for low contrast), film (a skeleton.Film; null: match all pairs), photographs (few, of straight
+    lenses with any focal length), zoomed (a film of several lenses), finer (detect features from twice the size on),
+    seed, masks (folder or null), database and output (paths; a null output asks for matches only).
     """
     pycolmap.set_random_seed(job["seed"])
     chosen = (
@@ -94,6 +98,9 @@ def _extract(job: dict, names: list[str], finer: bool, reduction: int = 1) -> li
         options.sift.domain_size_pooling = True
         options.sift.peak_threshold = 0.002
         options.sift.max_num_features = 8000
+    elif job["zoomed"]:  # each lens needs points enough of its own
+        options.sift.peak_threshold = 0.002
+        options.sift.max_num_features = 8000
     options.sift.max_num_features //= reduction
     if not Path(job["database"]).exists():
         _enter(job)
@@ -136,7 +143,8 @@ def _enter(job: dict) -> None:
 def _reader(job: dict, group: dict) -> pycolmap.ImageReaderOptions:
     reader = pycolmap.ImageReaderOptions()
     reader.camera_model = "SIMPLE_RADIAL"
-    reader.default_focal_length_factor = PHONE_FOCAL_SHARE  # between a phone's wide (0.8) and its portrait lens (1.4)
+    # between a phone's wide (0.8) and its portrait lens (1.4)
+    reader.default_focal_length_factor = PHONE_FOCAL_SHARE * group.get("zoom", 1.0)
     if group["focal_px"]:
         reader.camera_params = f"{group['focal_px']},{group['width'] / 2},{group['height'] / 2},0"
     if job["masks"]:
@@ -161,7 +169,7 @@ def _match(job: dict, pairs: list[tuple[str, str]] | None = None) -> None:
     _say("matching features", 0, 1)
     options = pycolmap.FeatureMatchingOptions()
     options.use_gpu = False
-    options.guided_matching = job["skin"]
+    options.guided_matching = job["skin"] or job["zoomed"]
     verification = pycolmap.TwoViewGeometryOptions()
     verification.ransac.random_seed = job["seed"]
     if pairs is not None:
@@ -264,7 +272,23 @@ def _map(job: dict, names: list[str] | None = None) -> list[pycolmap.Reconstruct
     models = pycolmap.incremental_mapping(
         job["database"], job["images"], str(folder), options, next_image_callback=another
     )
+    if job["zoomed"]:
+        for model in models.values():
+            _refine(model)
     return list(models.values())
+
+
+def _refine(model: pycolmap.Reconstruction) -> None:
+    """Adjust a model again by its good points, in place: focal lengths of several lenses lean on few others."""
+    adjust(model)
+    poor = [
+        number
+        for number, point in model.points3D.items()
+        if point.error > MOST_POINT_ERROR_PX or point.track.length() < LEAST_POINT_VIEWS
+    ]
+    for number in poor:
+        model.delete_point3D(number)
+    adjust(model)
 
 
 def _aside(function, *arguments) -> None:
@@ -292,7 +316,6 @@ def _die_with_parent() -> None:
 
 if __name__ == "__main__":
     threading.Thread(target=_die_with_parent, daemon=True).start()
-    pycolmap.logging.minloglevel = 2
     found = reconstruct(json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")))
     sys.stdout.flush()
     os._exit(0 if found else 3)

@@ -36,9 +36,14 @@ def _axes(model: pycolmap.Reconstruction, image: pycolmap.Image, folder: Path, h
         image.cam_from_world() if callable(image.cam_from_world) else image.cam_from_world,
     )
     tips = np.array([(0, 0, 0), *(tip for _, tip in AXES)]) @ pose.rotation.matrix().T + np.asarray(pose.translation)
-    pixels = np.asarray(camera.img_from_cam(tips))
-    start, *ends = [tuple(int(v) for v in pixel) for pixel in pixels]
+    pixels = [camera.img_from_cam(tip) if tip[2] > 0 else None for tip in tips]  # None also beyond the lens's view
+    reach = 10 * max(picture.shape)  # OpenCV draws no lines that end much farther away
+    start, *ends = [
+        None if pixel is None or not np.abs(pixel).max() < reach else tuple(int(v) for v in pixel) for pixel in pixels
+    ]
     for (colour, _), end in zip(AXES, ends, strict=True):
+        if start is None or end is None:
+            continue
         cv2.arrowedLine(picture, start, end, colour, max(2, picture.shape[0] // 240), cv2.LINE_AA, tipLength=0.1)
     return images.resize(picture, round(height * picture.shape[1] / picture.shape[0]), height)
 

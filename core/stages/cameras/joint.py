@@ -18,11 +18,12 @@ import pycolmap
 
 from ...capture.messages import Reporter
 from ...face import faces
-from ...face.bundle import TOLD_SIGMA_LOG, Bundle, Observations, adjust
+from ...face.bundle import TOLD_SIGMA_LOG, Bundle, Observations, adjust, focal_deviation
 from ...face.landmark_model import template_landmarks
 from ...geometry.models import pose_of
 from .matches import Matches
 from .resection import LEAST_MATCHES, agreeing, place_by_matches
+from .stated_focal import contradicts, tagged_names, tell
 from .world import PUPILS_M, agreeing_faces, find_head
 
 AGREE_WIDTH_SHARES = (0.0125, 0.006, 0.004)
@@ -33,6 +34,9 @@ FEATURE_SIGMA_SHARE = 1 / 3000
 """Deviation of a match, as a share of a picture's longer side: features are looked for at 2,000 pixels."""
 FREE_SIGMA_LOG = 3.0
 """Spread of the logarithm of a focal length that no file told: what matches tells it."""
+UNPULLED = 0.3
+"""Deviations of a focal length in the metadata by which matches that contradict it pull the adjusted one away, unless
+they know ten times less than it does."""
 FEWEST_TRACKS = 60  # below, what matches on the head says too little to refine by
 
 
@@ -44,14 +48,16 @@ def refine(
     report: Reporter,
     missing: Sequence[dict] = (),
     agree: Sequence[float] = AGREE_WIDTH_SHARES,
+    tags: Mapping[str, float] = MappingProxyType({}),
 ) -> pycolmap.Reconstruction:
     """Refine the cameras of a model by the matches on the head.
 
     `told` maps names to focal lengths in pixels from the files. `missing` lists camera groups {names, width, height,
     focal_px} of frames without a camera, which may get one by their matches and share the lens of frames of their size
-    unless their own is known. `agree`: as AGREE_WIDTH_SHARES, wider first if the cameras may be off. Returns the model
-    in the head's world (metres), or `model` itself if too little matches or the refined one explains less. Raises
-    Problem if no face is found.
+    unless their own is known. `agree`: as AGREE_WIDTH_SHARES, wider first if the cameras may be off. `tags` maps the
+    names of `told` that are tags of photographs to the deviations of their logs; where the matches contradict one, the
+    one of both with the smaller deviation is used, with a finding. Returns the model in the head's world (metres), or
+    `model` itself if too little matches or the refined one explains less. Raises Problem if no face is found.
     """
     head = find_head(model, face_by_name, PUPILS_M)
     model = pycolmap.Reconstruction(model)
@@ -60,7 +66,7 @@ def refine(
     registered = sorted((image for image in model.images.values() if image.has_pose), key=lambda image: image.name)
     names = [image.name for image in registered]
     straight = straightened(model, registered, matches)
-    bundle = as_bundle(model, registered, told)
+    bundle = as_bundle(model, registered, told, tags)
     marks = _landmarks(model, registered, seen_faces)
     width = float(np.median([face.box[2] - face.box[0] for face in seen_faces.values()]))
     before = None
@@ -77,6 +83,8 @@ def refine(
     if len(tracks) < 0.8 * before:
         report.log("The cameras were not refined by the face: less would match than before.")
         return model
+    if tags:
+        bundle = _without_contradicted_tags(bundle, seen, model, tags, report)
     lenses = _told_of_lenses(model, registered, told)
     groups = [{**group, "lens": same[-1]} for group in missing if (same := _lenses_of(group, model, lenses))]
     late = _late(bundle, model, groups, names, tracks, straight)
@@ -101,12 +109,49 @@ def _lenses_of(group: dict, model: pycolmap.Reconstruction, lenses: Mapping[int,
     ]
 
 
-def as_bundle(model: pycolmap.Reconstruction, registered: list, told: Mapping[str, float]) -> Bundle:
+def _without_contradicted_tags(
+    bundle: Bundle,
+    observations: Observations,
+    model: pycolmap.Reconstruction,
+    tags: Mapping[str, float],
+    report: Reporter,
+) -> Bundle:
+    """Return the bundle adjusted without the tags that it contradicts and knows better."""
+    tagged_by_lens = tagged_names(model, tags)
+    names = [tagged_by_lens.get(number, []) for number in sorted(model.cameras)]
+    tagged = np.array([bool(each) for each in names])
+    pulled = np.abs(np.log(bundle.focal / bundle.focal_prior)) > UNPULLED * bundle.focal_spread
+    if not (tagged & pulled).any():
+        return bundle
+    free = adjust(replace(bundle, focal_spread=np.where(tagged, FREE_SIGMA_LOG, bundle.focal_spread)), observations, 30)
+    deviations = np.stack([bundle.focal_spread, focal_deviation(free, observations)], 1)
+    dropped = np.zeros(len(tagged), bool)
+    for lens, number in enumerate(sorted(model.cameras)):
+        stated, own = bundle.focal_prior[lens], free.focal[lens]
+        if tagged[lens] and contradicts(stated, own, deviations[lens]):
+            tell(model.cameras[number], len(names[lens]), stated, own, deviations[lens], report)
+            dropped[lens] = deviations[lens, 1] < deviations[lens, 0]
+    if not dropped.any():
+        return bundle
+    if (dropped == tagged).all():
+        return free
+    return adjust(
+        replace(bundle, focal_spread=np.where(dropped, FREE_SIGMA_LOG, bundle.focal_spread)), observations, 30
+    )
+
+
+def as_bundle(
+    model: pycolmap.Reconstruction,
+    registered: list,
+    told: Mapping[str, float],
+    tags: Mapping[str, float] = MappingProxyType({}),
+) -> Bundle:
     """Return the cameras of the frames `registered` as a bundle in the head's world.
 
-    A focal length from a file is a prior.
+    A focal length from a file is a prior, with the deviation of its log in `tags`.
     """
     lenses = _told_of_lenses(model, registered, told)
+    spread = {image.camera_id: tags[image.name] for image in registered if image.name in tags}
     numbers = sorted(model.cameras)
     poses = [pose_of(image) for image in registered]
     focal = np.array([model.cameras[number].mean_focal_length() for number in numbers])
@@ -116,7 +161,7 @@ def as_bundle(model: pycolmap.Reconstruction, registered: list, told: Mapping[st
         np.array([pose.translation for pose in poses]),
         focal,
         np.array([lenses[number] or own for number, own in zip(numbers, focal, strict=True)]),
-        np.array([TOLD_SIGMA_LOG if lenses[number] else FREE_SIGMA_LOG for number in numbers]),
+        np.array([spread.get(number, TOLD_SIGMA_LOG) if lenses[number] else FREE_SIGMA_LOG for number in numbers]),
         np.array([numbers.index(image.camera_id) for image in registered]),
         np.array([[camera.principal_point_x, camera.principal_point_y] for camera in used]),
         np.zeros(len(template_landmarks().basis)),

@@ -22,6 +22,7 @@ from ...face import template
 from ...face.bundle import Bundle
 from ...face.landmark_model import template_landmarks
 from ...geometry.models import pose_of
+from .adjustment import adjust
 from .joint import as_bundle, rebuilt, straightened
 from .landmarks import similarity
 from .matches import Matches
@@ -109,7 +110,7 @@ def _follow(
         report.progress(step, len(REACH_WIDTH_SHARES), "finding the cameras with respect to the head")
         _, tracks, bundle = agreeing(bundle, names, straight, share * width)
         alone = rebuilt(room, bundle, registered, tracks, own)
-        _adjust(alone)
+        adjust(alone, focal=False, distortion=False)
         bundle = _with_poses(bundle, alone, names, tracks)
     return HeadCameras(bundle, alone, tracks)
 
@@ -246,21 +247,6 @@ def _face_width(model: pycolmap.Reconstruction, registered: list) -> float:
             ]
         )
     )
-
-
-def _adjust(model: pycolmap.Reconstruction) -> None:
-    """Minimise the reprojection error over poses and points, in place."""
-    options = pycolmap.BundleAdjustmentOptions()
-    options.refine_focal_length = options.refine_extra_params = False
-    options.print_summary = False
-    options.ceres.solver_options.num_threads = 1  # the same bytes each time
-    options.ceres.loss_function_type = pycolmap.LossFunctionType.SOFT_L1
-    spoken = pycolmap.logging.minloglevel
-    pycolmap.logging.minloglevel = 2  # errors
-    try:
-        pycolmap.bundle_adjustment(model, options)
-    finally:
-        pycolmap.logging.minloglevel = spoken
 
 
 def _with_poses(bundle: Bundle, model: pycolmap.Reconstruction, names: list[str], tracks: list) -> Bundle:

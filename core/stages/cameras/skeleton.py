@@ -102,7 +102,7 @@ def place_others(
             image = images[name]
             keypoints = np.asarray(stored.read_keypoints(image.image_id), np.float64)[:, :2]
             points = _points_of(model, matched.get(image.image_id, []))
-            if len(points) >= LEAST_POINTS:
+            if len(points) >= LEAST_POINTS and image.camera_id in model.cameras:  # a lens may have no mapped frame
                 _place(model, image, keypoints, points, options, refined)
             step(done + 1, len(names))
     model.update_point_3d_errors()

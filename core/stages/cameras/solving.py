@@ -17,7 +17,8 @@ from ...capture.frame_records import PHOTOGRAPHS, VIDEO, FrameRecord, Frames
 from ...capture.messages import Problem, Reporter
 from ...face import faces
 from ...settings.settings import Settings
-from . import skeleton
+from . import skeleton, stated_focal
+from .captions import find_captions, write_masks
 from .coverage import spread_evenly
 from .joint import holds_every_frame, refine
 from .landmarks import find_landmarks
@@ -29,6 +30,7 @@ from .settled import head_boxes, settle
 from .structure import ALL_PAIRS_FRAMES, camera_groups, film_of, match_crops, solve_structure
 from .surroundings import spread_over, surroundings_stay
 from .world import HeadFrame, find_head, head_of_one
+from .zoom import slow_zooms
 
 LEAST_PLACED_SHARE = 0.6
 LEAST_VIEWS = 3
@@ -54,7 +56,7 @@ class Solved:
     stood_still: the camera did, while the head turned; mirrored: frames left out; tracks, refined: how many refined a
     model from the face, and whether they are enough to trust it; matches: those it comes from; every_frame_held: every
     frame has enough matches; swayed: share of the head's matching error removed by cameras of its own; to_place: the
-    frames to be placed, if not all.
+    frames to be placed, if not all; zoomed: ratio of a slow zoom's largest and smallest magnification, else 1.
     """
 
     model: pycolmap.Reconstruction
@@ -70,6 +72,7 @@ class Solved:
     every_frame_held: bool = False
     swayed: float = 0.0
     to_place: tuple[FrameRecord, ...] = ()
+    zoomed: float = 1.0
 
 
 def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
@@ -210,17 +213,40 @@ def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Setting
     Photographs that only then match are placed as well.
     """
     if frames.kind == VIDEO and solved.way != "face" and not solved.head_moved:
-        return _settled(solved, frames, capture, settings, report)
+        return _settled(_zoomed(solved, frames, capture, settings, report), frames, capture, settings, report)
     by_face_alone = solved.way == "face" and not solved.refined
-    if frames.kind != PHOTOGRAPHS or len(frames.records) > ALL_PAIRS_FRAMES or by_face_alone:
+    if frames.kind != PHOTOGRAPHS or by_face_alone:
         return solved
+    told = {record.name: record.focal_px for record in frames.records if record.focal_px}
+    tags = {record.name: record.focal_deviation for record in frames.records if record.focal_px and record.focal_source}
+    if len(frames.records) > ALL_PAIRS_FRAMES:
+        model = stated_focal.settle(solved.model, told, tags, report)
+        if model is solved.model:
+            return solved
+        head = find_head(model, solved.face_by_name, settings.cameras.interpupillary_mm / 1000)
+        return replace(solved, model=model, head=head)
     placed = {image.name for image in solved.model.images.values() if image.has_pose}
     missing = [record for record in frames.records if record.name not in placed and record.name not in solved.mirrored]
-    told = {record.name: record.focal_px for record in frames.records if record.focal_px}
     groups = camera_groups(missing, capture.frames)
-    model = refine(solved.model, solved.face_by_name, solved.matches, told, report, groups)
+    model = refine(solved.model, solved.face_by_name, solved.matches, told, report, groups, tags=tags)
     head = find_head(model, solved.face_by_name, settings.cameras.interpupillary_mm / 1000)
     return replace(solved, model=model, head=head, every_frame_held=holds_every_frame(model))
+
+
+def _zoomed(solved: Solved, frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
+    """Solve the cameras again with a focal length for each stretch of a film, if its lens zoomed slowly."""
+    zooms = slow_zooms(solved.model, frames.records)
+    if zooms is None:
+        return solved
+    report.log("The lens zoomed while filming: the cameras are solved again, with a focal length for each stretch.")
+    records = tuple(replace(record, zoom=zoom) for record, zoom in zip(frames.records, zooms, strict=True))
+    again, matches, fault = _by_features(
+        solved.way == "skin", Frames(records, frames.kind), capture, solved.face_by_name, settings, report
+    )
+    zoomed = max(zooms) / min(zooms)
+    if fault or again.model.num_reg_images() < LEAST_PLACED_SHARE * solved.model.num_reg_images():
+        return replace(solved, zoomed=zoomed)
+    return replace(again, matches=matches, zoomed=zoomed)
 
 
 def _settled(solved: Solved, frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
@@ -261,9 +287,12 @@ def _by_features(
             if len(face_by_name) <= len(frames.records) / 2:
                 face_by_name = find_landmarks(frames.records, capture.frames, report)
             head_masks(face_by_name, frames.records, capture.frames, work, report)
-        model, matches = solve_structure(
-            frames, capture, skin, settings.cameras.matching, settings.seed, report, work if alone else None
-        )
+        captions = {} if alone else find_captions(frames.records, capture.frames)
+        if captions:
+            report.log(f"Captions or logos lie over {len(captions)} frames; what matches on them is left out.")
+            write_masks(captions, frames.records, work)
+        masks = work if alone or captions else None
+        model, matches = solve_structure(frames, capture, skin, settings.cameras.matching, settings.seed, report, masks)
     fault = shortcoming(model, len(frames.records))
     if fault:
         return None, matches, fault

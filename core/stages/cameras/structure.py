@@ -56,6 +56,7 @@ def solve_structure(
             "skin": skin,
             "film": [(name_of[name], *told) for name, *told in film_of(records)] if sequential else None,
             "photographs": few,
+            "zoomed": frames.kind == VIDEO and len({record.zoom for record in records}) > 1,
             "finer": skin or not sequential,
             "masks": str(masks) if masks else None,
             "seed": seed,
@@ -112,6 +113,7 @@ def match_crops(
             "groups": groups,
             "skin": False,
             "photographs": False,
+            "zoomed": False,
             "finer": True,
             "masks": None,
             "seed": seed,
@@ -134,13 +136,16 @@ def film_of(records: Sequence[FrameRecord]) -> skeleton.Film:
 
 
 def camera_groups(records: Sequence[FrameRecord], folder: Path) -> list[dict]:
-    """Group frames of one size and one focal length: [{names, width, height, focal_px or None}]."""
+    """Group frames of one size, focal length and zoom: [{names, width, height, focal_px or None, zoom}]."""
     groups = {}
     for record in records:
         width, height = images.size(folder / record.name)
-        key = width, height, record.focal_px
+        key = width, height, record.focal_px, record.zoom
         groups.setdefault(key, []).append(record.name)
-    return [{"names": names, "width": w, "height": h, "focal_px": f} for (w, h, f), names in groups.items()]
+    return [
+        {"names": names, "width": w, "height": h, "focal_px": f, "zoom": zoom}
+        for (w, h, f, zoom), names in groups.items()
+    ]
 
 
 def _enlarged(groups: list[dict], folder: Path) -> list[dict]:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stage frames: sharp frames of one exposure from a video or a folder of photographs, with the head's turn in each.
+"""Stage frames: sharp frames of one exposure from a video or photographs, with the head's turn in each.
 
 frames.json (capture/frame_records.py) describes the written frames, to which the gains have already been applied: every
 stage, and any tool that is given the folder, sees one exposure.
@@ -16,7 +16,8 @@ import numpy as np
 from ...capture.capture import Capture
 from ...capture.files import replacing_folder
 from ...capture.frame_records import FULL, PHOTOGRAPHS, VIDEO, FrameRecord, Frames, write_frames
-from ...capture.messages import Problem, Reporter
+from ...capture.messages import Problem, Reporter, name_some
+from ...capture.photographs import is_photograph
 from ...face import faces
 from ...face.glasses import sureness
 from ...imaging import images
@@ -25,10 +26,10 @@ from .doctor import FEW_FRAMES, FIND_FACE, blurred, diagnose, examine
 from .drift import content_of, gains_of
 from .eyes import blinks
 from .glasses import judge
-from .photographs import read_photographs
+from .pictures import read_source
 from .select import select_views, sharpness, turns
 from .source import Picture
-from .video import read_video
+from .zoom import features_of, zooms_of
 
 FEWEST_FRAMES = 3
 """Of a video; of photographs one is enough for a draft."""
@@ -36,6 +37,8 @@ STILL_DIFFERENCE = 0.004
 """Mean difference of two thumbnails in [0, 1] below which the camera did not move: above compression noise."""
 RIVAL_RATIO = 1.5
 """A face this much more prominent than the one followed takes its place."""
+FILMED_RATIO = 0.5
+"""Ratio of the difference of neighbours to that of pictures half the sequence apart, below which it is a film."""
 READING_SHARE = 0.9
 """Of the stage's time, for the progress."""
 
@@ -48,22 +51,25 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     path = capture.source
     if path is None or not (path.is_dir() or path.is_file()):
         raise Problem(
-            f"There is no video or folder of photographs at {str(path)!r}." if path else "No video was chosen.",
-            "Choose a video of the face or a folder of photographs.",
+            f"There is no video, photograph or folder of photographs at {str(path)!r}."
+            if path
+            else "No video was chosen.",
+            "Choose a video of the face, a photograph, or a folder of photographs.",
         )
-    photographs = path.is_dir()
-    read = read_photographs if photographs else read_video
-    pictures = read(path, settings.frames.max_frames, settings.frames.long_side, report)
+    photographs = path.is_dir() or is_photograph(path)
+    pictures = read_source(path, settings.frames.max_frames, settings.frames.long_side, settings.frames.colour, report)
     if settings.frames.mirrored:
         pictures = (replace(picture, srgb=_flipped(picture.srgb), full=_flipped(picture.full)) for picture in pictures)
     with replacing_folder(capture.frames) as folder:
         records, thumbnails, contents, glasses = _write_frames(pictures, folder, report)
         _check(path, records, thumbnails, photographs)
+        _tell_zoom(records, report)
         judge(glasses, settings.frames.no_glasses, report)
         records, contents, dropped = _drop_blurred(records, contents, folder)
         records = _even_out(records, contents, folder, report)
         shut = blinks([r.eyes_open for r in records], [r.time_s for r in records])
         records = [replace(r, blink=bool(blink)) for r, blink in zip(records, shut, strict=True)]
+        photographs = photographs and not _is_filmed(records, thumbnails)
         diagnose(records, dropped, photographs, report)
         records = _select(records, settings.frames.views)
         write_frames(folder, Frames(tuple(records), PHOTOGRAPHS if photographs else VIDEO))
@@ -73,7 +79,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
 def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[FrameRecord], np.ndarray, list, list[float]]:
     """Write all pictures; return their records, thumbnails [N, 32, 32], contents and log odds of glasses."""
-    records, thumbnails, contents, glasses, last = [], [], [], [], None
+    records, thumbnails, contents, glasses, details, last = [], [], [], [], [], None
     for picture in pictures:
         name = f"{picture.index:05d}.jpg"
         images.write_srgb(folder / name, picture.srgb, quality=95)
@@ -83,12 +89,29 @@ def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[FrameR
         last = face or last
         records.append(_record(picture, name, face, last, rival))
         thumbnails.append(images.resize(picture.srgb.mean(-1), 32, 32))
-        contents.append(content_of(picture.srgb))
+        contents.append(content_of(picture.srgb, picture.exposure))
+        if not picture.source:
+            details.append(features_of(picture.srgb))
         glasses.append(sureness(picture.srgb, face) if face else float("nan"))
         report.progress(
             READING_SHARE * picture.done, picture.of, f"frame {len(records)}, {'face found' if face else 'no face'}"
         )
+    zooms = zooms_of(details) or [1.0] * len(records)
+    records = [replace(record, zoom=zoom) for record, zoom in zip(records, zooms, strict=True)]
     return records, np.array(thumbnails), contents, glasses
+
+
+def _tell_zoom(records: list[FrameRecord], report: Reporter) -> None:
+    """Report a film whose lens changes."""
+    changes = [record for before, record in zip(records, records[1:], strict=False) if before.zoom != record.zoom]
+    if changes:
+        zoom = max(record.zoom for record in records) / min(record.zoom for record in records)
+        report.finding(
+            f"The lens changes in the film, by a zoom or a switch of lenses (x {zoom:.1f}), at frame "
+            f"{name_some([record.shown for record in changes])}. Each part has a camera of its own.",
+            "Film with one lens, without zooming: move the camera instead.",
+            [record.name for record in changes],
+        )
 
 
 def _flipped(picture: np.ndarray | None) -> np.ndarray | None:
@@ -127,6 +150,9 @@ def _record(picture: Picture, name: str, face: faces.Face | None, last: faces.Fa
         face_score=round(face.score, 4) if face else 0.0,
         yaw_deg=round(face.yaw_deg, 1) if face else None,
         focal_px=picture.focal_px,
+        focal_source=picture.focal.source,
+        focal_deviation=picture.focal.deviation,
+        focal_doubt=picture.focal.doubt,
         **examine(picture.srgb, near),
         eyes_open=tuple(round(x, 3) for x in faces.eye_openness(picture.srgb, face)) if face else None,
         other_face=round(rival, 3),
@@ -194,12 +220,26 @@ def _check(path: Path, records: list[FrameRecord], thumbnails: np.ndarray, photo
             "Film the face for 5 to 30 seconds, walking half around it. If the file may be damaged, copy it again.",
         )
     if not any(r.face_box for r in records):
+        if photographs and len(records) == 1:
+            raise Problem(
+                f"No face was found in {records[0].source}.",
+                "Choose a photograph that shows one face from the front or half from the side, upright and well lit.",
+            )
         raise Problem("No face was found in any frame.", FIND_FACE)
     if len(records) > 1 and np.abs(thumbnails - thumbnails[0]).mean((1, 2)).max() < STILL_DIFFERENCE:
         raise Problem(
             "All frames show the same picture: the camera did not move.",
             "Let the person sit still and move the camera from one ear around the face to the other.",
         )
+
+
+def _is_filmed(records: list[FrameRecord], thumbnails: np.ndarray) -> bool:
+    """Return whether numbered pictures are a film's frames: neighbours [N, 32, 32] are alike, unlike the others."""
+    if any(record.time_s is None for record in records):
+        return False
+    near = np.abs(np.diff(thumbnails, axis=0)).mean((1, 2))
+    far = np.abs(thumbnails - np.roll(thumbnails, len(thumbnails) // 2, axis=0)).mean((1, 2))
+    return bool(np.median(near) < FILMED_RATIO * np.median(far))
 
 
 def _report(capture: Capture, records: list[FrameRecord], dropped: list[str], report: Reporter) -> None:

@@ -11,47 +11,41 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...imaging import images
+from ...imaging import colours, images
+from ...imaging.colours import Colour, into_gamut
 
 SDR, HLG, PQ = 1, 18, 16
 """Transfer characteristics by ITU-T H.273; everything but HLG and PQ is taken as SDR."""
 REC709, REC2020, P3 = 1, 9, 12
 """Colour primaries by ITU-T H.273; P3 is Display P3."""
-COMPACT_SRGB = ("c2", "c2ci")
-"""Names of small sRGB profiles, as social networks write them."""
 WHITE_NITS, PEAK_NITS = 203.0, 1000.0
 KNEE_LINEAR = 0.8
 """The tone curve changes nothing below: all of a face but its highlights."""
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of linear Rec. 709 (ITU-R BT.709)
 LUMINANCE_2020 = np.array([0.2627, 0.6780, 0.0593], np.float32)  # of linear Rec. 2020 (ITU-R BT.2020)
+
+
+def matrix_to_rec709(red: tuple, green: tuple, blue: tuple) -> np.ndarray:
+    """Return the matrix [3, 3] from linear light of primaries at these (x, y), and a white of D65, to Rec. 709's."""
+    return np.linalg.inv(_to_xyz(*REC709_POINTS)) @ _to_xyz(red, green, blue)
+
+
+def _to_xyz(*points: tuple[float, float]) -> np.ndarray:
+    """Return the matrix [3, 3] to CIE XYZ in which white (1, 1, 1) is D65 (SMPTE RP 177)."""
+    columns = np.array([(x / y, 1.0, (1 - x - y) / y) for x, y in (*points, D65)]).T
+    return columns[:, :3] * np.linalg.solve(columns[:, :3], columns[:, 3])
+
+
+REC709_POINTS, D65 = ((0.640, 0.330), (0.300, 0.600), (0.150, 0.060)), (0.3127, 0.3290)
 TO_REC709 = {
-    REC2020: np.array(
-        [[1.660491, -0.587641, -0.072850], [-0.124550, 1.132900, -0.008349], [-0.018151, -0.100579, 1.118730]],
-        np.float32,
-    ),
-    P3: np.array(
-        [[1.224940, -0.224940, 0.0], [-0.042057, 1.042057, 0.0], [-0.019638, -0.078636, 1.098274]], np.float32
-    ),
+    REC2020: matrix_to_rec709((0.708, 0.292), (0.170, 0.797), (0.131, 0.046)).astype(np.float32),
+    P3: matrix_to_rec709((0.680, 0.320), (0.265, 0.690), (0.150, 0.060)).astype(np.float32),
 }
 
-ADOBE_GAMMA = 563 / 256
-ADOBE_TO_REC709 = np.array([[1.398356, -0.398356, 0.0], [0.0, 1.0, 0.0], [0.0, -0.042929, 1.042929]], np.float32)
-"""Adobe RGB (1998), Adobe Systems, 2005: its exponent, and its primaries, whose white is sRGB's."""
 
-
-def from_profile(signal: np.ndarray, profile: str) -> np.ndarray | None:
-    """Convert values [..., 3] in [0, 1] to sRGB by the name of their colour profile ('' is sRGB).
-
-    None for an unknown profile.
-    """
-    name = profile.lower().replace(" ", "")
-    if not name or "srgb" in name or name in COMPACT_SRGB:
-        return signal
-    if "displayp3" in name:  # an iPhone's JPEG
-        return to_srgb(signal, SDR, P3)
-    if "adobergb" in name:
-        return images.linear_to_srgb(into_gamut(np.clip(signal, 0, 1) ** ADOBE_GAMMA @ ADOBE_TO_REC709.T))
-    return None
+def from_stated(signal: np.ndarray, colour: Colour) -> np.ndarray:
+    """Convert a photograph's stored values [..., 3] to sRGB; HDR as a video's."""
+    transfer = {colours.HLG: HLG, colours.PQ: PQ}.get(colour.curve) if isinstance(colour.curve, str) else None
+    return colour.to_srgb(signal) if transfer is None else to_srgb(signal, transfer, colour.primaries)
 
 
 def to_srgb(signal: np.ndarray, transfer: int, primaries: int) -> np.ndarray:
@@ -82,14 +76,6 @@ def pq_light(signal: np.ndarray) -> np.ndarray:
     root = np.maximum(signal, 0) ** (1 / 78.84375)
     linear = (np.maximum(root - 0.8359375, 0) / (18.8515625 - 18.6875 * root)) ** (1 / 0.1593017578125)
     return linear * (10000 / WHITE_NITS)
-
-
-def into_gamut(light: np.ndarray) -> np.ndarray:
-    """Mix linear Rec. 709 light with grey of its luminance, just so far that no part is negative."""
-    luminance = np.maximum(light @ LUMINANCE, 0)[..., None]
-    least = light.min(-1, keepdims=True)
-    keep = np.where(least < 0, luminance / np.maximum(luminance - least, 1e-9), 1)
-    return np.maximum(luminance + (light - luminance) * keep, 0)
 
 
 def tone_curve(light: np.ndarray) -> np.ndarray:

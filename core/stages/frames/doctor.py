@@ -33,6 +33,19 @@ DRIFT_RATIO = 1.12
 EQUAL_RATIO, OFTEN_SHARE = 0.75, 0.5
 """Prominence of a second face over the first at which the subject is unclear, and the share of frames with that."""
 
+DRAFTS = (
+    (
+        "There is only one photograph: a draft. The head's depth, sides and ears are guessed from other people's.",
+        "Take a second one from about 40 degrees to one side, which measures the depth and shows that cheek and ear; a "
+        "third from the other side makes it a whole face.",
+    ),
+    (
+        "There are only two photographs: a draft. What neither shows is guessed from other people's heads.",
+        "Take a third one, so that the front and both sides are there, about 40 degrees apart: then the head follows "
+        "this person's on both sides.",
+    ),
+)
+"""Problem and remedy of one photograph and of two."""
 FEW_SIDES = (
     "Take one from the front, one about 40 degrees to each side, both profiles, and some from below and "
     "above, while the person sits still."
@@ -84,8 +97,10 @@ def diagnose(records: list[FrameRecord], dropped: list[str], photographs: bool, 
         raise Problem("The only frames with a face are blurred and were left out.", FIND_FACE)
     count, shots = len(records), "photographs" if photographs else "frames"
     _other_faces(with_face, shots, report)
-    if count < FEW_FRAMES:
-        there = f"There are only {count} {shots}" if count > 1 else f"There is only one {shots[:-1]}"
+    if photographs and count <= len(DRAFTS):
+        report.finding(*DRAFTS[count - 1])
+    elif count < FEW_FRAMES:
+        there = f"There are only {count} {shots}"
         expect = (
             "a head that follows features and outlines, with less detail than a film's"
             if photographs
@@ -102,9 +117,10 @@ def diagnose(records: list[FrameRecord], dropped: list[str], photographs: bool, 
             "Keep the whole face in the picture, upright and well lit.",
             lost,
         )
-    _angles(records, photographs, report)
+    if count > 1:
+        _angles(records, photographs, report)
     _size(with_face, report)
-    _light(with_face, report)
+    _light(with_face, photographs, report)
     _sharpness(with_face, dropped, count, shots, report)
 
 
@@ -166,7 +182,7 @@ def _size(records: list[FrameRecord], report: Reporter) -> None:
     if share < FAR_SHARE:
         report.finding(
             f"The face is small in the picture: {share:.0%} of its width.",
-            "Go closer, or zoom in, until the head fills half of the picture.",
+            "Go closer until the head fills half of the picture.",
             _names([r for r, w in zip(records, width, strict=True) if w < FAR_SHARE * min(r.size)]),
         )
     elif np.median(width) < SMALL_PX:
@@ -177,7 +193,7 @@ def _size(records: list[FrameRecord], report: Reporter) -> None:
         )
 
 
-def _light(records: list[FrameRecord], report: Reporter) -> None:
+def _light(records: list[FrameRecord], photographs: bool, report: Reporter) -> None:
     bright, clipped, noise = np.array([(r.brightness, r.clipped, r.noise) for r in records]).T
     if np.median(bright) < DARK_SRGB:
         report.finding(
@@ -202,7 +218,8 @@ def _light(records: list[FrameRecord], report: Reporter) -> None:
     if ratio > DRIFT_RATIO or tint > DRIFT_RATIO:
         what = f"The exposure changed by {ratio - 1:.0%}" if ratio > DRIFT_RATIO else "The white balance changed"
         report.finding(
-            f"{what} while filming; it was evened out as far as possible.",
+            f"{what} {'between the photographs' if photographs else 'while filming'}; it was evened out as far as "
+            "possible.",
             "Lock exposure and white balance: hold a finger on the face in the camera app until it says locked.",
             _names([r for r in records if abs(np.log(r.gain)).max() > np.log(DRIFT_RATIO) / 2]),
         )

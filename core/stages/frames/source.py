@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...imaging import images
+from ...imaging.focal import Focal
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,8 @@ class Picture:
 
     index: decoded frame or sorted file; time_s: None for a photograph; source: file name of a photograph; focal_px at
     this size if the file states it; progress of the reading, `done` of `of`; full [h, w, 3]: the same picture larger,
-    for the features that cameras are found by, if there is one.
+    for the features that cameras are found by, if there is one; exposure: natural log of the light gathered, up to a
+    constant, if the file states it; focal: what the file's metadata tell of the focal length.
     """
 
     srgb: np.ndarray
@@ -28,6 +30,8 @@ class Picture:
     done: int
     of: int
     full: np.ndarray | None = None
+    exposure: float | None = None
+    focal: Focal = Focal()
 
 
 def evenly(count: int, most: int) -> np.ndarray:

@@ -10,18 +10,28 @@ well as four seconds.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import av
 import numpy as np
 from av.video.reformatter import Interpolation
 
-from ...capture.messages import Problem, Reporter
+from ...capture.messages import Reporter
 from .colour import HLG, PQ, REC709, REC2020, to_srgb
+from .interlace import deinterlaced, find_interlacing
+from .log_curves import CURVES, LINEAR, RECORDED, decode, recorded_curve
 from .source import Picture, evenly_in_time, fitted
+from .streams import Index, open_video
+from .streams import index as index_film
 
 UNSPECIFIED, FULL_RANGE = 2, 2
+DARK_SHARE = 0.001
+LOG_BLACK, LOG_WHITE = 0.08, 0.85
+"""Share of the darkest and brightest pixels of a frame that are left aside, and the darkest and brightest sRGB between
+which all frames of log footage lie: its curves put black at 0.09 to 0.15 and a white card at 0.6 to 0.7. Such a film is
+asked about, not converted: a grey scene in fog lies there as well."""
+LINEAR_LIGHT = 8
+"""Transfer characteristic of linear light by ITU-T H.273."""
 REC709_MATRIX, REC601_MATRIX, REC2020_MATRIX = 1, 5, 9
 """Matrices from R'G'B' to Y'CbCr by ITU-T H.273."""
 EXACT_16 = Interpolation.AREA | Interpolation.ACCURATE_RND
@@ -36,61 +46,81 @@ LARGE_PX = 2560 * 1440
 """Size above which the decoder has few threads: each keeps a frame, of 100 MB in 8K."""
 
 
-def read_video(path: Path, most: int, long_side: int, report: Reporter) -> Iterator[Picture]:
+def read_video(path: Path, most: int, long_side: int, report: Reporter, colour: str = RECORDED) -> Iterator[Picture]:
     """Yield at most `most` frames of a video, evenly spread in time, shrunk to `long_side` pixels.
 
-    Raises Problem for a file that is not a readable video.
+    `colour` is the setting's: how the film was recorded, where its file does not say so. Raises Problem for a file that
+    is not a readable video.
     """
-    index = _index(path, report)
+    index = index_film(path, report)
     wanted = evenly_in_time(index.times, most)
-    given, corrupt = 0, 0
-    with _open(path) as container:
-        stream = container.streams.video[0]
+    interlaced = find_interlacing(path, index)
+    if interlaced:
+        report.finding(
+            "The film is interlaced: each frame mixes two moments. They were separated, and half the rows filled in.",
+            "Set the camera to a progressive format (1080p, not 1080i).",
+        )
+    given, darkest, brightest = 0, 1.0, 0.0
+    with open_video(path) as container:
+        stream = container.streams[index.stream]
         large = stream.codec_context.width * stream.codec_context.height > LARGE_PX
         stream.thread_type, stream.thread_count = "AUTO", 2 if large else 0
-        for number, frame in _frames(container, stream, index, wanted, report):
+        if colour == RECORDED:
+            colour = recorded_curve(path, container.metadata, stream.metadata) or RECORDED
+        for number, frame in _frames(container, stream, index, wanted, interlaced, report):
             if frame.is_corrupt:
-                corrupt += 1
                 continue
             # certain only once a frame is decoded
             transfer, primaries = stream.codec_context.color_trc, stream.codec_context.color_primaries
-            if not given and transfer in (HLG, PQ):
-                report.log("The video is HDR; its highlights are compressed into sRGB.")
             turns, mirrored = orientation(frame)
-            if not given and mirrored:
-                report.finding(
-                    "The video is marked to be shown mirrored, as by a front camera; it was flipped back.",
-                    "If moles end up on the wrong side, switch off mirroring of the front camera, or film with the "
-                    "back camera.",
-                )
+            if not given:
+                _tell_first(transfer, colour, mirrored, report)
             size = fitted(frame.width * (stream.sample_aspect_ratio or 1), frame.height, long_side)
             given += 1
+            srgb = _srgb(frame, size, transfer, primaries, colour)
+            low, high = np.quantile(srgb[::8, ::8], (DARK_SHARE, 1 - DARK_SHARE))
+            darkest, brightest = min(darkest, low), max(brightest, high)
             yield Picture(
-                np.ascontiguousarray(np.rot90(_srgb(frame, size, transfer, primaries), turns)),
-                number,
-                frame.time,
-                "",
-                None,
-                number + 1,
-                len(index.times),
+                np.ascontiguousarray(np.rot90(srgb, turns)), number, frame.time, "", None, number + 1, len(index.times)
             )
     if given < 0.9 * len(wanted):
         report.finding(
             f"Only {given} of {len(wanted)} frames could be read; the file seems damaged or cut off.",
             "Copy the video again from the phone.",
         )
+    if given and colour == RECORDED:
+        _ask_colour(transfer, primaries, darkest, brightest, report)
 
 
-@dataclass(frozen=True)
-class _Index:
-    """Time stamps from a video's packets, in units of the stream.
+def _tell_first(transfer: int, colour: str, mirrored: bool, report: Reporter) -> None:
+    """Report how a film is recorded, once its first frame is decoded."""
+    if colour in CURVES:
+        report.log(f"The film is decoded from {CURVES[colour].title}; its highlights are compressed into sRGB.")
+    elif colour == RECORDED and transfer in (HLG, PQ):
+        report.log("The video is HDR; its highlights are compressed into sRGB.")
+    if mirrored:
+        report.finding(
+            "The video is marked to be shown mirrored, as by a front camera; it was flipped back.",
+            "If moles end up on the wrong side, switch off mirroring of the front camera, or film with the "
+            "back camera.",
+        )
 
-    times [N] of all frames in order of showing (consecutive numbers if there are none); keys: those of frames that
-    decoding can begin with (none: from the start only).
-    """
 
-    times: np.ndarray
-    keys: np.ndarray
+def _ask_colour(transfer: int, primaries: int, darkest: float, brightest: float, report: Reporter) -> None:
+    """Ask about a film that may be log footage whose file does not say so. It is not converted by a guess."""
+    if transfer in (HLG, PQ, LINEAR_LIGHT):
+        return
+    if transfer == UNSPECIFIED and primaries == REC2020:
+        problem = "The film's file names a wide gamut, but no curve, as that of log footage may."
+    elif darkest > LOG_BLACK and brightest < LOG_WHITE:
+        problem = "The film has no black and no white, as ungraded log footage, and its file names no curve."
+    else:
+        return
+    report.finding(
+        problem,
+        "If it was filmed in Apple Log, S-Log3 or V-Log, choose that under Reconstruction > Colour, which shows "
+        "previews (in a terminal: --colour); else leave it as it is.",
+    )
 
 
 def orientation(frame: av.VideoFrame) -> tuple[int, bool]:
@@ -109,54 +139,13 @@ def orientation(frame: av.VideoFrame) -> tuple[int, bool]:
     return -round(float(np.degrees(np.arctan2(b, a))) / 90) % 4, mirrored
 
 
-def _open(path: Path):
-    try:
-        container = av.open(str(path))
-    except (av.FFmpegError, OSError, ValueError) as error:
-        if path.stat().st_size == 0:
-            raise Problem(
-                f"{path.name} is empty.", "Copy the video again from the phone, or choose another one."
-            ) from error
-        raise Problem(
-            f"{path.name} cannot be read: it is damaged, cut off before its end, or no video at all.",
-            "Copy it again from the phone, or choose an MP4 or MOV file that a video player opens.",
-        ) from error
-    if not container.streams.video:
-        container.close()
-        raise Problem(f"{path.name} has no picture, only sound or data.", "Choose a video of the face.")
-    return container
-
-
-def _index(path: Path, report: Reporter) -> _Index:
-    """Index a video from its packets alone: containers' own counts and rates are often missing or wrong."""
-    times, keys, count = [], [], 0
-    with _open(path) as container:
-        try:
-            for packet in container.demux(container.streams.video[0]):
-                if packet.size > 0 and not packet.is_discard:
-                    count += 1
-                    if packet.pts is not None:
-                        times.append(packet.pts)
-                        if packet.is_keyframe:
-                            keys.append(packet.pts)
-                if count % 100 == 0:
-                    report.check()
-        except av.FFmpegError:
-            report.log("The video ends in damaged data; what comes before is used.")
-    if count == 0:
-        raise Problem(f"{path.name} holds no frames.", "Copy it again from the phone, or choose another video.")
-    if len(set(times)) < count:  # old AVI files and raw streams
-        return _Index(np.arange(count), np.array([], int))
-    return _Index(np.array(sorted(times)), np.array(sorted(keys), int))
-
-
 def _frames(
-    container, stream, index: _Index, frame_numbers: np.ndarray, report: Reporter
+    container, stream, index: Index, frame_numbers: np.ndarray, interlaced: str | None, report: Reporter
 ) -> Iterator[tuple[int, av.VideoFrame]]:
     """Yield the frames of these numbers, or the next that can be decoded, with their numbers."""
     for starts, numbers in _stretches(index, frame_numbers):
         targets = list(numbers)
-        for number, frame in _from(container, stream, index, starts, targets[0], report):
+        for number, frame in _from(container, stream, index, starts, targets[0], interlaced, report):
             if number < targets[0]:
                 report.check()
                 continue
@@ -168,7 +157,7 @@ def _frames(
 
 
 def _from(
-    container, stream, index: _Index, starts: list[int], first: int, report: Reporter
+    container, stream, index: Index, starts: list[int], first: int, interlaced: str | None, report: Reporter
 ) -> Iterator[tuple[int, av.VideoFrame]]:
     """Yield all frames with their numbers from one of `starts` on: the first from which frame `first` is not missed.
 
@@ -176,25 +165,28 @@ def _from(
     """
     for left, start in zip(range(len(starts))[::-1], starts, strict=True):
         container.seek(start, stream=stream)
-        frames = _numbered(container, stream, index, report)
+        frames = _numbered(container, stream, index, interlaced, report)
         landed = next(frames, None)
         if landed is not None and (landed[0] <= first or not left):
             yield landed
             yield from frames
             return
     if not starts:
-        yield from _numbered(container, stream, index, report)
+        yield from _numbered(container, stream, index, interlaced, report)
 
 
-def _numbered(container, stream, index: _Index, report: Reporter) -> Iterator[tuple[int, av.VideoFrame]]:
-    for count, frame in enumerate(_decode(container, stream, report)):
+def _numbered(
+    container, stream, index: Index, interlaced: str | None, report: Reporter
+) -> Iterator[tuple[int, av.VideoFrame]]:
+    frames = _decode(container, stream, report)
+    for count, frame in enumerate(deinterlaced(frames, stream, interlaced) if interlaced else frames):
         yield (
             (int(np.searchsorted(index.times, frame.pts)) if len(index.keys) and frame.pts is not None else count),
             frame,
         )
 
 
-def _stretches(index: _Index, frame_numbers: np.ndarray) -> list[tuple[list[int], list[int]]]:
+def _stretches(index: Index, frame_numbers: np.ndarray) -> list[tuple[list[int], list[int]]]:
     """Group wanted numbers into stretches decoded in one go, each with time stamps to jump to, nearest first.
 
     None: read on from the start.
@@ -224,9 +216,13 @@ def _decode(container, stream, report: Reporter) -> Iterator[av.VideoFrame]:
             report.check()
 
 
-def _srgb(frame: av.VideoFrame, size: tuple[int, int], transfer: int, primaries: int) -> np.ndarray:
+def _srgb(
+    frame: av.VideoFrame, size: tuple[int, int], transfer: int, primaries: int, colour: str = RECORDED
+) -> np.ndarray:
     """Convert a decoded frame to sRGB float32 [H, W, 3] of that width and height, not yet turned."""
-    plain = transfer not in (HLG, PQ) and primaries in (REC709, UNSPECIFIED)
+    if colour == RECORDED and transfer == LINEAR_LIGHT:
+        colour = LINEAR
+    plain = colour == RECORDED and transfer not in (HLG, PQ) and primaries in (REC709, UNSPECIFIED)
     full = frame.color_range == FULL_RANGE
     # by default swscale takes every matrix for Rec. 601, which turns a phone's Rec. 709 skin greenish, and full-range
     # values for narrow ones
@@ -243,7 +239,8 @@ def _srgb(frame: av.VideoFrame, size: tuple[int, int], transfer: int, primaries:
         return frame.reformat(format="rgb24", **options).to_ndarray().astype(np.float32) / 255
     white = 65535 if full or frame.format.is_rgb else WHITE_16
     signal = frame.reformat(format="rgb48le", **options).to_ndarray().astype(np.float32) / white
-    return to_srgb(np.minimum(signal, 1), transfer, primaries)
+    signal = np.minimum(signal, 1)
+    return to_srgb(signal, transfer, primaries) if colour == RECORDED else decode(signal, colour, primaries)
 
 
 def _matrix(frame: av.VideoFrame, transfer: int, primaries: int) -> int:

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Give spoiled files and odd names to the chain, and judge whether each was met as it should be.
 
-    python -m research.benchmarks.hostile [--count 1000] [--seed 0] [--only K] [--until transfer] [--json
-        research/records/hostile.json]
+    python -m research.benchmarks.hostile [--count 1000] [--seed 0] [--only K] [--kind NAME] [--until transfer]
+        [--json research/records/hostile.json]
 
 A case is a copy of a small finished capture (eight frames of the sample video) with the user's files in it, one thing
 spoiled, and the stage or command that reads it, in a process forked from one in which everything is imported. It must
@@ -36,6 +36,7 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", type=int, metavar="K", help="case number K alone, as of a fault; its output is shown")
+    parser.add_argument("--kind", choices=KINDS, help="cases of this kind alone")
     parser.add_argument("--until", choices=NAMES, default=NAMES[-1], help="the last stage that is tried")
     parser.add_argument("--delighter", default="network")
     options = parser.parse_args()
@@ -54,7 +55,9 @@ def run_cases(options: argparse.Namespace, work: Path) -> dict[str, Counter]:
     worker.warm_up()
     undisturbed = capture.run_undisturbed(work / "undisturbed", options.until, options.delighter, lambda text: None)
     stock, rows = Stock(undisturbed, work / "stock"), {}
-    kinds = {name: kind for name, kind in KINDS.items() if kind.needs in undisturbed.names}
+    kinds = {
+        name: kind for name, kind in KINDS.items() if kind.needs in undisturbed.names and options.kind in (None, name)
+    }
     for number in range(options.count):
         if options.only not in (None, number):
             continue
@@ -69,6 +72,7 @@ def run_cases(options: argparse.Namespace, work: Path) -> dict[str, Counter]:
         if faults:
             print(f"{number:5} {kind}: {case.description}", *(f"      {fault}" for fault in faults), sep="\n")
             words = f"--seed {options.seed} --count {options.count} --until {options.until} --only {number}"
+            words += f" --kind '{options.kind}'" if options.kind else ""
             print(f"      Again: python -m research.benchmarks.hostile {words} --delighter {options.delighter}")
         if options.only is not None:
             print(f"{kind}: {case.description}\nexit code {ended.code} after {ended.seconds:.1f} s and", end=" ")

@@ -16,6 +16,7 @@ from core.capture import stages
 from ..figures import SAMPLE
 from ..kills.capture import DELIVERY, Undisturbed, capture_at
 from ..kills.worker import in_fork
+from . import films
 from .mutations import VALUES, mutate
 
 CHEAP = {"cameras": 6, "scan": 5, "texture": 2, "shadow_mask": 2}
@@ -55,7 +56,8 @@ SMALL = {"long_side": 320, "views": 3}
 class Case:
     """A command line, the spoiled file with the names by which a refusal may call it, and the outputs if it is taken.
 
-    content: of the spoiled file, which must be somewhere afterwards.
+    content: of the spoiled file, which must be somewhere afterwards; sound_picture: a photograph before it was spoiled;
+    clean: the folder of the pictures that a film shows; outcome: of those in films.
     """
 
     place: Path
@@ -65,6 +67,9 @@ class Case:
     outputs: tuple[str, ...] = ()
     description: str = ""
     content: bytes | None = None
+    sound_picture: Path | None = None
+    clean: Path | None = None
+    outcome: str = films.ANY
 
     @property
     def root(self) -> Path:
@@ -99,6 +104,7 @@ class Stock:
         self.undisturbed, self.folder, end = undisturbed, folder, undisturbed.end
         folder.mkdir()
         shutil.copy(SAMPLE / "capture.mp4", folder / "film.mp4")
+        in_fork(lambda: _make_clean(folder))
         shutil.copytree(end.frames, folder / "photographs", ignore=shutil.ignore_patterns("*.json", "*.psd", ".*"))
         shutil.copytree(end.cameras, folder / "model", ignore=shutil.ignore_patterns("*.txt"))
         shutil.copy(SAMPLE / "cameras.json", folder / "cameras.json")
@@ -158,6 +164,19 @@ def source(case: Case, stock: Stock, rng: random.Random, name: str, **settings) 
     shutil.rmtree(case.root)
     case.run("frames", str(brought), forced=False, frames=settings)
     case.spoil(brought, rng)
+    case.sound_picture = stock.folder / name / case.spoiled.name if brought.is_dir() else None
+
+
+def film(case: Case, stock: Stock, rng: random.Random) -> None:
+    """Begin a new capture with a film in other streams, containers, transfers, fields, times."""
+    (case.place / "brought").mkdir()
+    brought = case.place / "brought" / "film.mp4"
+    shutil.copy(stock.folder / "small.mp4", brought)
+    shutil.rmtree(case.root)
+    words, case.outcome = in_fork(lambda: films.respoil(brought, rng))
+    case.run("frames", str(brought), forced=False, frames={"max_frames": 8, **SMALL})
+    case.spoiled, case.named, case.clean = brought, (brought.name, "frame", "face"), stock.folder / "clean"
+    case.description = f"{brought.relative_to(case.place)}: {words}"
 
 
 def imported(case: Case, stock: Stock, rng: random.Random, names: list[str], output: str) -> None:
@@ -232,11 +251,14 @@ KINDS = {
     },
     "books": Kind(book, 8),
     "video": Kind(partial(source, name="film.mp4", max_frames=8, **SMALL)),
+    "films": Kind(film, 12),
     "photographs": Kind(partial(source, name="photographs", **SMALL)),
     "mask": Kind(partial(imported, names=["mask.png", "mask.exr", "mask.jpg"], output="shadow_mask.png"), 6),
     "landmarks": Kind(partial(imported, names=["landmarks.json"], output="landmarks_artist.json")),
     "settings": Kind(settings),
-    "cameras": Kind(partial(setting, stage="cameras", names=["model", "cameras.json"], key="import_from")),
+    "cameras": Kind(
+        partial(setting, stage="cameras", names=["model", "cameras.json"], key="import_from"), 4, "cameras"
+    ),
     "names": Kind(odd_name),
     "own mesh": Kind(partial(setting, stage="registration", names=["mesh.obj"], key="template"), 1, "registration"),
     "delit pictures": Kind(
@@ -244,6 +266,17 @@ KINDS = {
     ),
     "deliver": Kind(deliver, 4, "solve"),
 }
+
+
+def _make_clean(folder: Path) -> None:
+    """Make the small film, and the pictures that it shows."""
+    from core.capture.messages import Reporter
+    from core.imaging import images
+    from core.stages.frames.video import read_video
+
+    films.make_clean(folder / "film.mp4", folder / "small.mp4")
+    for picture in read_video(folder / "small.mp4", 8, SMALL["long_side"], Reporter("frames")):
+        images.write_srgb(folder / "clean" / f"{picture.index:05d}.png", picture.srgb)
 
 
 def _draw_masks(folder: Path) -> None:

@@ -13,6 +13,8 @@ import struct
 import zlib
 from pathlib import Path
 
+from . import pictures
+
 NUMBERS = (*"nan -nan inf -inf 1e30 -1e30 1e-310 -1 0 999999999999 1e999 x 1,5 0x10".split(), "")
 VALUES = (
     None,
@@ -205,7 +207,7 @@ ANY = (truncate, truncate, flip, overwrite, replace_whole, append, other_kind, r
 SPECIAL = {
     ".png": (forge_png, spoil_pixels, spoil_pixels),
     ".exr": (forge_exr, spoil_pixels, spoil_pixels),
-    ".jpg": (spoil_pixels, forge_png),
+    ".jpg": (spoil_pixels, forge_png, *pictures.JPEGS),
     ".json": (spoil_json,) * 8,
     ".obj": (spoil_lines,) * 5,
     ".ply": (spoil_lines, spoil_counts),

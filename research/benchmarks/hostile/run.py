@@ -20,12 +20,17 @@ from core.capture import ownership
 from ..kills.capture import BESIDE
 from ..kills.judge import find_lost
 from ..kills.worker import Forked, in_fork
+from . import films
 from .cases import Case
 
 LIMIT_S = 90.0
 """Time after which a case counts as hanging: the dearest stage takes a fifth of it on a quiet core."""
 MORE_BYTES, MOST_BYTES = 4 << 30, 3 << 30
 """Limit of address space beside the warmed process's, and of the memory in use."""
+
+
+MOST_CODES = 3.0
+"""Mean difference to the clean picture, of 255, from which a spoiled photograph must be told."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +94,7 @@ def judge(case: Case, ended: Ended) -> list[str]:
     if ended.code == 2 and not faults:
         faults += _judge_refusal(case, ended.errors)
     if ended.code == 0:
-        faults += in_fork(lambda: _find_unsound(case))
+        faults += in_fork(lambda: _find_unsound(case) + _find_silence(case) + _find_silent_photograph(case))
     return faults + _find_lost(case)
 
 
@@ -114,6 +119,35 @@ def _find_unsound(case: Case) -> list[str]:
             fault = _unsound(file) if file.is_file() and name in ours else ""
             found += [f"{name} {fault}"] if fault else []
     return found
+
+
+def _find_silence(case: Case) -> list[str]:
+    """Find a film that was used in silence although its pictures are not those it shows, or a finding was due."""
+    import json
+
+    import numpy as np
+    import OpenImageIO as oiio
+
+    record = case.root / "capture.json"
+    if case.clean is None or not record.is_file():
+        return []
+    findings = json.loads(record.read_text(encoding="utf-8"))["stages"].get("frames", {}).get("findings", [])
+    if findings or case.outcome == films.ANY:
+        return []
+    if case.outcome == films.TOLD:
+        return ["it was used in silence"]
+    off = []
+    for path in sorted((case.root / "frames").glob("*.jpg")):
+        clean = case.clean / f"{path.stem}.png"
+        if not clean.is_file():
+            return [f"frame {path.stem} is none of the clean film's"]
+        pictures = [oiio.ImageInput.open(str(each)).read_image("float")[..., :3] for each in (path, clean)]
+        if pictures[0].shape != pictures[1].shape:
+            return [f"frame {path.stem} has another size than the clean film's"]
+        off.append(float(np.abs(pictures[0] - pictures[1]).mean()))
+    if not off or np.mean(off) > films.MOST_OFF:
+        return [f"it was used in silence, {255 * np.mean(off or [1]):.1f} codes off the clean picture"]
+    return []
 
 
 def _unsound(file: Path) -> str:
@@ -143,6 +177,30 @@ def _unsound(file: Path) -> str:
         poses = [image.cam_from_world() for image in model.images.values() if image.has_pose]
         finite = poses and all(np.isfinite(pose.matrix()).all() for pose in poses)
     return "" if finite else "holds what is no finite number"
+
+
+def _find_silent_photograph(case: Case) -> list[str]:
+    """Find a spoiled photograph that was used, no longer looks as it did, and is not named in a finding."""
+    import json
+
+    import numpy as np
+
+    from core.imaging import images
+
+    if case.sound_picture is None:
+        return []
+    name = case.spoiled.name
+    told = json.loads((case.root / "capture.json").read_text(encoding="utf-8"))["stages"]["frames"]["findings"]
+    records = json.loads((case.root / "frames" / "frames.json").read_text(encoding="utf-8"))["frames"]
+    used = next((record for record in records if record["source"] == name), None)
+    if used is None or any(name in finding["problem"] or used["name"] in finding["frames"] for finding in told):
+        return []
+    clean = images.read_srgb(case.sound_picture)
+    linear = images.read_linear(case.root / "frames" / used["name"]) / np.array(used["gain"], np.float32)
+    picture = images.linear_to_srgb(linear)
+    clean = images.resize(clean, *picture.shape[1::-1]) if clean.shape != picture.shape else clean
+    off = 255 * float(np.abs(picture - clean).mean())
+    return [f"{name} is used in silence, {off:.1f} codes off"] if off > MOST_CODES else []
 
 
 def _find_lost(case: Case) -> list[str]:

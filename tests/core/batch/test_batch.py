@@ -16,7 +16,7 @@ from core.batch import gate, local
 from core.batch.known_hashes import known_hashes
 from core.batch.record import read_batch
 from core.batch.state import DONE, STOPPED, TO_DO, WAITING, derive_state
-from core.capture import hashes, lease
+from core.capture import hashes, lease, tone_choice
 from core.capture.files import write_json
 from core.capture.messages import Progress
 from core.capture.stages import NAMES
@@ -202,6 +202,14 @@ def test_what_is_delivered_is_what_the_maps_are_now(code, tmp_path):
     record["stages"]["solve"]["finished"] = "2026-01-01T00:00:00"
     write_json(batch.face("b").capture.json, record)
     assert states(batch) == {"a": DONE, "b": TO_DO}, "its maps are others since"
+    record = batch.face("a").capture.read()
+    record["stages"]["solve"]["figures"] = {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_source": "scene"}
+    write_json(batch.face("a").capture.json, record)
+    assert states(batch)["a"] == DONE
+    tone_choice.write_choice(batch.face("a").capture, "6")
+    assert states(batch)["a"] == TO_DO, "its skin tone is another since"
+    tone_choice.write_choice(batch.face("a").capture, "auto")
+    assert states(batch)["a"] == DONE
 
 
 def test_contact_sheets_by_the_blender_that_is_named(code, tmp_path):

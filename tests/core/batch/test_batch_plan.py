@@ -11,6 +11,7 @@ from core.__main__ import main
 from core.batch.record import read_batch
 from core.batch.shots import read_faces
 from core.capture.messages import Problem
+from core.capture.tone_choice import read_choice, write_choice
 
 
 @pytest.fixture
@@ -36,10 +37,10 @@ def plan(folder, text: str, encoding="utf-8", **shared):
 @pytest.mark.parametrize("start", ["", "\ufeff"])
 def test_a_table_as_spreadsheets_write_it(folder, separator, start):
     rows = (
-        ("Video", "name", "tone", "white", "quality"),
-        ("anna.mp4", "Anna", '"0.8,0.6,0.5"', "auto", ""),
-        ("", "", "", "", ""),
-        ("zoë b.mov", "", "", "", "draft"),
+        ("Video", "name", "tone", "white", "colour", "quality"),
+        ("anna.mp4", "Anna", '"0.8,0.6,0.5"', "auto", "", ""),
+        ("", "", "", "", "", ""),
+        ("zoë b.mov", "", "", "", "v_log", "draft"),
     )
     faces, faults = plan(folder, start + "\r\n".join(separator.join(row) for row in rows) + "\r\n")
     assert faults == [] and [(face.name, face.source, face.root.name, face.quality) for face in faces] == [
@@ -47,7 +48,7 @@ def test_a_table_as_spreadsheets_write_it(folder, separator, start):
         ("zoë b", folder / "zoë b.mov", "zoë b.wildcap", "draft"),
     ]
     assert faces[0].settings == {"solve": {"skin_tone": "0.8,0.6,0.5", "white_point": "auto"}}
-    assert faces[1].settings == {}
+    assert faces[1].settings == {"frames": {"colour": "v_log"}}
 
 
 def test_a_rows_settings_lie_over_the_files_and_those_over_the_shared_ones(folder):
@@ -67,6 +68,24 @@ def test_a_rows_settings_lie_over_the_files_and_those_over_the_shared_ones(folde
         "registration": {"template": str(folder / "head.obj")},
     }
     assert faces[1].settings == {"solve": {"steps": 9, "size": 256}, "seed": 4}, "one row's values reach no other"
+
+
+def test_a_tone_that_the_table_changes_is_the_choice_until_the_artist_makes_another(folder):
+    table, batch = folder / "shots.csv", folder / "batch"
+
+    def tones(cell: str) -> list[str]:
+        table.write_text(f'video,tone\nanna.mp4,{cell}\ncarl,\n', encoding="utf-8")
+        assert main(["batch", "plan", str(table), str(batch)]) == 0
+        return [face.chosen().solve.skin_tone for face in read_batch(batch).faces]
+
+    assert tones("6") == ["6", "auto"]
+    anna = read_batch(batch).face("anna").capture
+    anna.claim()
+    assert tones('"0.7,0.6,0.5"') == ["0.7,0.6,0.5", "auto"] and read_choice(anna) == "0.7,0.6,0.5"
+    write_choice(anna, "4")
+    assert tones('"0.7,0.6,0.5"') == ["4", "auto"], "the table says nothing new"
+    assert read_batch(batch).face("anna").wanted()["solve"] == {"skin_tone": "4"}
+    assert tones("") == ["auto", "auto"] and read_choice(anna) == "auto"
 
 
 def test_a_name_that_a_disk_may_take_for_another_one_is_refused(folder, capsys):

@@ -12,7 +12,7 @@ from core.__main__ import main
 from core.batch import review
 from core.batch.record import Batch, BatchFace, write_batch
 from core.batch.state import DONE, STOPPED, TO_DO, WAITING, FaceState
-from core.capture import stages
+from core.capture import stages, tone_choice
 from core.capture.files import write_json
 from core.imaging import images
 from core.settings.settings import Settings
@@ -81,6 +81,19 @@ def test_the_worst_measure_decides_and_where_that_is_equal_their_mean(batch):
     assert lines[3].endswith("nothing is worse than in the others")
 
 
+def test_faces_whose_estimated_tone_spans_more_than_three_swatches_come_first_until_one_is_chosen(batch):
+    for name, deviation in (("good", 12.0), ("told", 6.0)):
+        capture, stage = batch.face(name).capture, stages.by_name("solve")
+        figures = {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_source": "scene", "skin_tone_deviation_l": deviation}
+        capture.finish(stage, {"code": "", "inputs": {}}, 1.0, Settings(), figures, "0")
+    assert order(batch)[0] == "good"
+    page, rows = review.write_review(batch)
+    assert "Choose the skin tone" in page.read_text(encoding="utf-8")
+    assert review.list_riskiest(rows)[0].endswith("its skin tone waits to be chosen")
+    tone_choice.write_choice(batch.face("good").capture, "6")
+    assert order(batch)[-1] == "good"
+
+
 def test_stopped_faces_come_first_then_those_that_wait(batch, monkeypatch):
     states = {
         "good": FaceState(STOPPED, review.GROUPS[0], "It <broke>.", "Mend it."),
@@ -92,7 +105,8 @@ def test_stopped_faces_come_first_then_those_that_wait(batch, monkeypatch):
     assert order(batch) == ["good", "told", "half", "bad chin"]
     page = Page((batch.root / review.NAME).read_text(encoding="utf-8"))
     assert {"It <broke>.", "Mend it.", "4 min of work; still to do: head, mask, solve, deliver"} <= set(page.texts)
-    assert [text for text in page.texts if text in review.HEADINGS.values()] == list(review.HEADINGS.values())
+    headings = list(review.HEADINGS.values())
+    assert [text for text in page.texts if text in headings] == headings[1:], "no face's tone is open"
 
 
 def test_the_page_is_escaped_loads_nothing_and_links_where_the_reports_are(batch):

@@ -12,7 +12,7 @@ import pytest
 
 from core.capture.frame_records import FrameRecord
 from core.capture.messages import Reporter
-from core.face.bundle import TOLD_SIGMA_LOG, Observations, adjust
+from core.face.bundle import TOLD_SIGMA_LOG, Observations, adjust, focal_deviation
 from core.face.faces import Face
 from core.face.landmark_model import template_landmarks
 from core.stages.cameras import _left_out, solving
@@ -160,6 +160,45 @@ def test_a_given_focal_length_is_the_files_and_an_unknown_one_beside_it_is_free(
     assert bundle.focal_spread.tolist() == [TOLD_SIGMA_LOG, FREE_SIGMA_LOG]
     alone = adjust(bundle, Observations(np.zeros(1, int), np.zeros(1, int), np.zeros((1, 2))))
     assert alone.focal == pytest.approx([FOCAL, 0.9 * FOCAL], rel=0.01), "nothing but the priors says anything"
+
+
+@pytest.mark.parametrize(
+    ("ratio", "deviation", "used", "words"),
+    [
+        (1.6, 0.06, 1.0, "by the pictures"),
+        (0.6, 0.03, 1.0, "by the pictures"),
+        (1.04, 0.0005, 1.04, "by the metadata"),
+        (1.02, 0.03, 1.0, ""),
+    ],
+)
+def test_of_a_tag_and_matches_that_contradict_it_the_surer_one_is_used(scene, ratio, deviation, used, words):
+    rng, views, found = scene
+    matches, report = matched(views, rng), Reporter("cameras")
+    told, tags = dict.fromkeys(views, ratio * FOCAL), dict.fromkeys(views, deviation)
+    refined = refine(model_of(views, (FOCAL,)), found, matches, told, report, tags=tags)
+    assert refined.cameras[1].params[0] == pytest.approx(used * FOCAL, rel=0.015)
+    assert [words in finding["problem"] for finding in report.findings] == [True] * bool(words)
+
+
+def test_a_focal_length_is_as_uncertain_as_it_comes_out_and_more_so_on_a_flat_arc():
+    rng, deviations = np.random.default_rng(5), []
+    for reach in (50, 12):
+        views = {f"{i}.jpg": place_camera(azimuth, 0.0) for i, azimuth in enumerate(np.linspace(-reach, reach, 5))}
+        model = model_of(views, (FOCAL,))
+        images = sorted(model.images.values(), key=lambda image: image.name)
+        points = rng.normal(0, 0.07, (150, 3))
+        start = replace(as_bundle(model, images, {}), feature_px=0.3)
+        start = replace(start, points=np.concatenate([start.points, points]))
+        camera, point = (index.ravel() for index in np.indices((5, len(points))))
+        off_by = []
+        for _ in range(4):
+            pixel = np.concatenate([view.project(points)[0] for view in views.values()])
+            observed = Observations(camera, 468 + point, pixel + rng.normal(0, 0.3, pixel.shape))
+            bundle = adjust(start, observed)
+            off_by.append(abs(np.log(bundle.focal[0] / FOCAL)) / focal_deviation(bundle, observed)[0])
+        deviations.append(focal_deviation(bundle, observed)[0])
+        assert 0.1 < np.sqrt(np.mean(np.square(off_by))) < 2.2
+    assert deviations[1] > 3 * deviations[0]
 
 
 def test_a_late_frame_gets_the_lens_of_its_focal_length(scene):

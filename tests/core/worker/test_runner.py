@@ -133,3 +133,24 @@ def test_jobs_that_cannot_be_are_refused(capture, video):
         capture.job.write_text(text, encoding="utf-8")
         refuses(words, read_job, capture.job)
         assert isinstance(runner.run_job(capture.job), Failed)
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_the_frames_tell_the_skin_tone_unasked_and_a_failure_stops_nothing(capture, video, monkeypatch, fails):
+    """So the panel can mark it from the moment that there are frames, also in a copy of the capture."""
+
+    class Tool:
+        @staticmethod
+        def run(capture, settings, report):
+            assert (capture.root / "frames").is_dir()
+            report.figure("skin_tone_srgb", [0.5, 0.4, 0.3])
+            report.finding("Skin tone: estimated.", "Choose it if it looks wrong.")
+            if fails:
+                raise ValueError("no eyes")
+
+    monkeypatch.setattr(runner, "_room", lambda step: Tool if step.name == "skin_tone" else tiny_room(step))
+    messages = run_here(capture, source=video, last="cameras")
+    record = capture.read()["stages"]
+    figures = record["frames"]["figures"]
+    assert isinstance(messages[-1], Done) and figures["size_px"] == 64 and not record["frames"]["findings"]
+    assert ("skin_tone_srgb" in figures) == (not fails) and "skin_tone_srgb" not in record["cameras"]["figures"]

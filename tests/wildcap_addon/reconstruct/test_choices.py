@@ -9,6 +9,7 @@ import pytest
 
 from core.capture.capture import Capture
 from tests.fixtures import standin
+from tests.fixtures.drawn import drawn
 from tests.fixtures.refused import refuses
 
 bpy = pytest.importorskip("bpy")
@@ -114,3 +115,20 @@ def test_the_chain_can_begin_at_any_stage(addon, capture, item, monkeypatch):
         ("reconstruct", "delight", "shadow_mask"),
         ("reconstruct", None, "shadow_mask"),
     ]
+
+
+def test_colours_are_chosen_by_their_pictures(addon, capture, item, tmp_path, monkeypatch):
+    started, panel = [], addon("reconstruct.panel").WILDCAP_PT_colour
+    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool, **options: started.append(tool))
+    (tmp_path / "film.mov").touch()
+    Capture(capture).set_source(tmp_path / "film.mov")
+    bpy.ops.wildcap.preview_colours()
+    assert started == ["colours"]
+    assert "As Recorded" not in [text for text, _ in drawn(panel)]
+    folder = capture / "preview"
+    folder.mkdir(exist_ok=True)
+    for choice in ("recorded", "s_log3"):
+        (folder / f"colour_{choice}.png").write_bytes(standin.plain((200, 100, 50)))
+    assert list(addon("reconstruct.colours").previews(Capture(capture))) == ["recorded", "s_log3"]
+    item.frames.colour = "s_log3"
+    assert addon("properties").job_settings(item)["frames"]["colour"] == "s_log3"

@@ -15,13 +15,14 @@ from scipy.spatial.transform import Rotation
 from skimage.data import astronaut
 
 from core.capture.capture import Capture
-from core.capture.frame_records import read_frames
+from core.capture.frame_records import FrameRecord, read_frames
 from core.capture.messages import CancelledError, Reporter
 from core.face import faces
 from core.geometry.views import read_views
 from core.imaging import images
 from core.settings.settings import from_json
 from core.stages import cameras, frames
+from core.stages.cameras.drawing import draw_cameras
 from core.stages.cameras.landmarks import find_landmarks
 from core.stages.cameras.solving import Solved
 from core.stages.cameras.world import PUPILS_M, HeadFrame, find_head, intersect_rays
@@ -158,3 +159,20 @@ def test_some_frames_of_a_real_video_against_its_truth(tmp_path):
     assert figures["up_tilt_deg"] < 13 and abs(figures["facing_off_deg"]) < 5
     assert figures["true_units_per_metre"] == pytest.approx(1 / 0.0553, rel=0.04)
     assert json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"][-1]["video_frame"] == 95
+
+
+@pytest.mark.parametrize(("focal", "distance"), [(18.0, 0.5), (400.0, 0.05), (400.0, -0.3), (1e9, 0.5)])
+def test_axes_that_a_camera_cannot_see_are_left_out_of_the_picture(tmp_path, focal, distance):
+    images.write_srgb(tmp_path / "0.jpg", np.full((64, 48, 3), 0.5, np.float32))
+    model = pycolmap.Reconstruction()
+    params = [focal, 24, 32, -0.4]
+    model.add_camera_with_trivial_rig(
+        pycolmap.Camera(camera_id=1, model="SIMPLE_RADIAL", width=48, height=64, params=params)
+    )
+    towards = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, distance]])
+    model.add_image_with_trivial_frame(
+        pycolmap.Image(name="0.jpg", camera_id=1, image_id=1), pycolmap.Rigid3d(towards.astype(float))
+    )
+    record = FrameRecord(name="0.jpg", sharpness=1.0, selected=True)
+    picture = draw_cameras(model, [record], tmp_path, 64)
+    assert picture.shape == (64, 48 + 64, 3) and np.isfinite(picture).all()

@@ -138,6 +138,7 @@ def job_of(folder, work, names, film=()) -> dict:
         "groups": [{"names": names, "width": 450, "height": 600, "focal_px": None}],
         "skin": False,
         "photographs": False,
+        "zoomed": False,
         "film": film,
         "finer": True,
         "masks": None,

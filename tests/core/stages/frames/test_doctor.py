@@ -76,7 +76,7 @@ def test_blurred_frames_and_blinks_are_left_out_and_the_exposure_is_test_blurred
     assert [r["video_frame"] for r in records if r["blink"]] == [5, 11]
     assert sum(r["selected"] for r in records) == 13 and not any(r["selected"] and r["blink"] for r in records)
     evened = np.array([r["gain"] for r in records]).mean(1) * gain[[r["video_frame"] for r in records]]
-    assert np.ptp(np.log(evened)) < 0.03
+    assert np.ptp(np.log(evened)) < 0.05
     assert report.figures["frames_dropped_as_blurred"] == 3 and report.figures["frames_with_a_blink"] == 2
     assert report.figures["exposure_drift_percent"] == pytest.approx(33, abs=4)
     assert "3 of 18 photographs are blurred" in problems(report) and "exposure changed" in problems(report)

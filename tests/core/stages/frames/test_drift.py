@@ -69,6 +69,17 @@ def turning_head(angle: float, skin: np.ndarray, wall: np.ndarray) -> tuple[np.n
     return np.where(inside[..., None], head, wall[..., None] * 0.3).astype(np.float32), inside
 
 
+def turn(monkeypatch, skin: np.ndarray, wall: np.ndarray, gains: np.ndarray) -> list[drift.Content]:
+    """A head that turns before a wall, by a camera of these gains."""
+    contents = []
+    for i, gain in enumerate(gains):
+        picture, inside = turning_head(0.0675 * i, skin, wall)
+        mask = inside.astype(np.float32)
+        monkeypatch.setattr(faces, "segment_person", lambda small, mask=mask: cv2.resize(mask, small.shape[1::-1]))
+        contents.append(content_of(exposed(picture, gain)))
+    return contents
+
+
 @pytest.mark.parametrize("textured", [True, False], ids=["a textured wall", "an empty wall"])
 @pytest.mark.parametrize("drifting", [False, True], ids=["steady", "drifting"])
 def test_a_head_that_turns_into_the_shade_is_not_drift(monkeypatch, textured, drifting):
@@ -76,16 +87,11 @@ def test_a_head_that_turns_into_the_shade_is_not_drift(monkeypatch, textured, dr
     skin = noise(rng, 8, 1200, 480)
     wall = noise(rng, 9, WIDTH, HEIGHT) if textured else np.ones((HEIGHT, WIDTH), np.float32)
     true = np.exp(drifting * 0.25 * np.sin(np.arange(count) / 4))[:, None] * np.ones(3)
-    contents = []
-    for i in range(count):
-        picture, inside = turning_head(0.0675 * i, skin, wall)
-        mask = inside.astype(np.float32)
-        monkeypatch.setattr(faces, "segment_person", lambda small, mask=mask: cv2.resize(mask, small.shape[1::-1]))
-        contents.append(content_of(exposed(picture, true[i])))
+    contents = turn(monkeypatch, skin, wall, true)
     assert np.mean([c.person.mean() for c in contents]) > (0.2 if textured else 0.8)
     gains = gains_of(contents)
     if not drifting:
-        assert np.abs(np.log(gains)).max() <= 0.02
+        assert (gains == 1).all()
     elif textured:
         assert errors(gains, true).max() < 0.03
     else:
@@ -93,14 +99,37 @@ def test_a_head_that_turns_into_the_shade_is_not_drift(monkeypatch, textured, dr
         assert errors(gains, true).max() < errors(np.ones((count, 3)), true).max() + 0.05
 
 
-def test_the_share_that_must_agree_is_a_majority():
+@pytest.mark.parametrize(("wall", "left"), [(1.0, 0.5), (0.0, 0.7)], ids=["an empty wall", "a black ground"])
+def test_a_jump_is_evened_in_part_while_the_head_turns_before_nothing(monkeypatch, wall, left):
+    skin = noise(np.random.default_rng(3), 8, 1200, 480)
+    true = np.where(np.arange(8) < 5, 1.0, 0.7)[:, None] * np.ones(3)
+    gains = gains_of(turn(monkeypatch, skin, np.full((HEIGHT, WIDTH), wall, np.float32), true))
+    assert errors(gains, true).max() < left * abs(np.log(0.7))
+
+
+def test_a_change_counts_as_far_as_person_and_ground_agree():
+    def agreed(person: float, ground: float | None, deviation: float = 0.1) -> float:
+        behind = None if ground is None else drift.Link(np.full(3, ground), 0.01)
+        return drift._agreed(drift.Link(np.full(3, person), deviation), behind).gain.mean()
+
+    assert agreed(-0.3, -0.2) == agreed(-0.2, -0.3) == pytest.approx(-0.2)
+    assert agreed(-0.3, 0.2) == agreed(-0.3, 0) == 0, "one of them denies it"
+    assert agreed(-0.15, None) == 0 and agreed(-0.25, None) == pytest.approx(-0.25)
+
+
+def test_matches_that_move_by_themselves_are_left_out():
     rng = np.random.default_rng(0)
-    place = rng.uniform(0, 400, (200, 2)).astype(np.float32)
-    ratio = 0.2 + 0.01 * rng.normal(size=(200, 3))
-    ratio[:60] += 0.5  # a lamp that was switched on over a part of it
-    gain, _, shading = drift._common(ratio, place)
-    assert gain == pytest.approx(0.2, abs=0.01) and not shading
-    assert drift._common(rng.normal(size=(200, 3)), place) is None
-    slope = 0.00016 * (place[:, :1] - 200) * np.ones(3) + 0.003 * rng.normal(size=(200, 3))
-    assert drift._common(0.02 + slope, place)[2], "brighter on one side, darker on the other, and little in common"
-    assert not drift._common(0.2 + slope, place)[2]
+    place = rng.uniform(0, 400, (100, 2))
+    moved = place * 1.05 + [20, 5]
+    moved[:30] = rng.uniform(0, 400, (30, 2))
+    kept = drift._moving_together(place, moved)
+    assert kept[30:].mean() > 0.8 and kept[:30].mean() < 0.1
+    assert not drift._moving_together(place, rng.uniform(0, 400, (100, 2))).any()
+
+
+def test_metadata_stand_in_for_surface_points_if_every_picture_has_them():
+    flat = [np.full((60, 80, 3), level, np.float32) for level in (0.5, 0.4, 0.5)]
+    stated = [content_of(picture, exposure) for picture, exposure in zip(flat, (0.0, -0.4, 0.0), strict=True)]
+    assert np.log(gains_of(stated)).mean(1) == pytest.approx([0, 0.4, 0], abs=0.01)
+    stated[2] = content_of(flat[2])
+    assert (gains_of(stated) == 1).all()
