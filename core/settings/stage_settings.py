@@ -23,6 +23,20 @@ class FramesSettings:
     """Longer side of the extracted frames"""
     views: int = setting(16, min=3, max=64)
     """Sharp, evenly spread frames chosen for the texture (V in the paper)"""
+    colour: str = setting(
+        "recorded",
+        choices=("recorded", "apple_log", "s_log3", "v_log", "linear"),
+        titles={
+            "recorded": "As Recorded",
+            "apple_log": "Apple Log",
+            "s_log3": "S-Log3",
+            "v_log": "V-Log",
+        },
+        flag="--colour",
+        per_face=True,
+    )
+    """How the colours were recorded, where the file does not say it. As Recorded: as the file says, else as plain
+    video. The logs are with their cameras' gamuts: Rec. 2020, S-Gamut3.Cine, V-Gamut"""
     mirrored: bool = setting(False, per_face=True)
     """The pictures are mirrored, as a front camera may save them: flip them back. A head alone cannot show which way
     round it was"""
@@ -75,6 +89,9 @@ class DelightSettings:
         per_face=True,
     )
     """How the light is taken out of the frames before the texture is built"""
+    torch: str = setting("auto", choices=("auto", "on", "off"), flag="--torch", per_face=True)
+    """Whether the phone's torch was on while filming. On: its light is known and taken out, without delighter or mask;
+    auto: a film whose light moves with the camera is told"""
     switchlight_preview: bool = setting(
         False, label="Small Pictures at Half the Credits", flag="--preview", per_face=True
     )
@@ -130,9 +147,16 @@ class SolveSettings:
     grid_cells: int = setting(96, min=1, max=512)
     """Cells per side of the texel grid of lights over the whole map's face crop (96 cells of 8 texels at 1024)"""
     skin_tone: str = setting(
-        "auto", form="R,G,B or #RRGGBB or auto", parse=parse_skin_tone, flag="--skin-tone", per_face=True
+        "auto",
+        form="R,G,B or #RRGGBB or a swatch's number or auto",
+        parse=parse_skin_tone,
+        flag="--skin-tone",
+        per_face=True,
+        affects_result=False,
     )
-    """Skin tone in sRGB (linear mean over facial skin), as 0.69,0.54,0.46 or 176,138,118 or #B08A76; auto: estimated"""
+    """Skin tone in sRGB (linear mean over facial skin), as 0.69,0.54,0.46 or 176,138,118 or #B08A76, or a swatch of
+    measured skin in this person's hue, 1 (light) to 10 (dark); auto: estimated. Changed after the solve, it is baked
+    into the skin when the head is delivered"""
     white_point: str = setting(
         "auto", form="R,G,B or auto", parse=parse_white_point, flag="--white-point", per_face=True
     )

@@ -34,7 +34,8 @@ def begun(shading) -> Start:
     )
     mean = (texture * inside).sum((1, 2)) / inside.sum() / 0.4
     state = State(0, None, reference, Lights(constant_light(mean), torch.zeros(1, 9, 4, 4), torch.ones(3)))
-    return Start(torch.full((3,), 0.4), OURS, reference, 1.0, torch.zeros(SIZE, SIZE), {1: o}, state)
+    tone = torch.full((3,), 0.4)
+    return Start(tone, tone, OURS, reference, torch.ones(3), torch.zeros(SIZE, SIZE), {1: o}, state)
 
 
 def fitted(start, recipe, move, steps=10) -> tuple[float, float]:

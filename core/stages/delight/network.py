@@ -21,7 +21,7 @@ import torch
 from ...capture.capture import Capture
 from ...capture.messages import Problem, Reporter
 from ...face import template
-from ...face.head import read_head
+from ...face.head import Head, read_head
 from ...face.networks import has_files, read_network
 from ...geometry.raster import interpolate, sample
 from ...geometry.views import View, read_views
@@ -63,12 +63,12 @@ class Answers:
     hair: list[np.ndarray]
 
 
-def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
-    """Yield the selected frames without their shading.
+def network(capture: Capture, settings: Settings, report: Reporter, head: Head | None = None) -> Iterator[Delit]:
+    """Yield the selected frames without their shading. head: the capture's, if it was read already.
 
     Raises Problem if the weights are missing or the views hardly see the head.
     """
-    answers = ask(capture, settings, report)
+    answers = ask(capture, settings, report, head)
     count = len(answers.views)
     for i, (view, look, skin) in enumerate(zip(answers.views, put_together(answers), answers.skins, strict=True)):
         report.progress(3 * count + i, 4 * count, f"Delighting frame {i + 1} of {count}")
@@ -77,18 +77,18 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
         yield Delit(view, albedo, shadow)
 
 
-def ask(capture: Capture, settings: Settings, report: Reporter) -> Answers:
+def ask(capture: Capture, settings: Settings, report: Reporter, head: Head | None = None) -> Answers:
     """Return both answers on a capture, before they are put together. Raises Problem as `network` does."""
     net, views = load_network(settings.compute_device), read_views(capture, selected_only=True)
-    head = fit_lit_head(read_head(capture), views, report)
+    lit = fit_lit_head(head or read_head(capture), views, report)
     looks, fitted = [], []
     for i, view in enumerate(views):
         report.progress(2 * len(views) + i, 4 * len(views), f"Looking at frame {i + 1} of {len(views)}")
-        look, log = ask_of_view(net, view, head)
+        look, log = ask_of_view(net, view, lit)
         looks.append(look)
         fitted.append(log)
-    skins, hair = ([seen_in(head, shares, look) for look in looks] for shares in (head.skin, head.hair))
-    return Answers(head, views, looks, fitted, skins, hair)
+    skins, hair = ([seen_in(lit, shares, look) for look in looks] for shares in (lit.skin, lit.hair))
+    return Answers(lit, views, looks, fitted, skins, hair)
 
 
 def put_together(answers: Answers) -> list[ShadingEstimate]:

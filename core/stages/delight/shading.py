@@ -14,7 +14,7 @@ import numpy as np
 
 from ...capture.capture import Capture
 from ...capture.messages import Reporter
-from ...face.head import read_head
+from ...face.head import Head, read_head
 from ...geometry.raster import bleed, interpolate, render_view
 from ...geometry.views import View, read_views
 from ...imaging import images
@@ -24,13 +24,16 @@ from .lit_head import LitHead, fit_lit_head
 from .occlusion import FINE_SHARE, ZONE_SHARE, estimate_sun_share, remove_seams
 
 
-def shading(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
-    """Yield the selected frames divided by their shading, which is 1 where the skin is best lit."""
+def shading(capture: Capture, settings: Settings, report: Reporter, head: Head | None = None) -> Iterator[Delit]:
+    """Yield the selected frames divided by their shading, which is 1 where the skin is best lit.
+
+    head: the capture's, if it was read already.
+    """
     views = read_views(capture, selected_only=True)
-    head = fit_lit_head(read_head(capture), views, report)
+    lit = fit_lit_head(head or read_head(capture), views, report)
     for i, view in enumerate(views):
         report.progress(2 * len(views) + 2 * i, 4 * len(views), f"Delighting frame {i + 1} of {len(views)}")
-        yield _delight(view, head)
+        yield _delight(view, lit)
 
 
 def _delight(view: View, head: LitHead) -> Delit:

@@ -11,7 +11,7 @@ from ...capture.messages import Problem, Reporter
 from ...face import parser, template
 from ...face.head import Head
 from ...face.parts import keep_beard, keep_present
-from ...geometry.meshes import vertex_uvs
+from ...geometry.meshes import Mesh, vertex_uvs
 from ...geometry.raster import sample, sample_uv
 from ...geometry.views import View
 from ...geometry.visibility import points_in_view
@@ -24,13 +24,17 @@ HAIRY = ("beard", "hair", "eyes", "clothes")
 ASKED = (*HAIRY, "brows")
 
 
-def smooth_normals(head: Head, rounds: int = 2) -> np.ndarray:
-    """Return unit vertex normals [V, 3], averaged with their neighbours: a scan's noise would show as light."""
-    mesh, normals = head.mesh, head.normals
+def neighbours(mesh: Mesh) -> sparse.csr_matrix:
+    """Return the matrix [V, V] that adds its neighbours' values to each vertex's, once for each common face."""
     edges = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
     count = len(mesh.vertices)
     graph = sparse.coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), (count, count)).tocsr()
-    graph = graph + graph.T + sparse.identity(count)
+    return graph + graph.T + sparse.identity(count)
+
+
+def smooth_normals(head: Head, rounds: int = 2) -> np.ndarray:
+    """Return unit vertex normals [V, 3], averaged with their neighbours: a scan's noise would show as light."""
+    normals, graph = head.normals, neighbours(head.mesh)
     for _ in range(rounds):
         normals = graph @ normals
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Proposal of the shadow mask M, in UV: shadows in single frames, dark areas left in I_UV, and occlusion baked into it.
 
-Writes shadow_mask_auto.png only (8 bit grey, soft edges); shadow_mask.png is the artist's and is never touched.
+Writes shadow_mask_auto.png only (8 bit grey, soft edges); shadow_mask.png is the artist's and is never touched. Where
+the light was known nothing is proposed.
 """
 
 from __future__ import annotations
@@ -73,6 +74,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """
     report.progress(0, 8, "Unfolding the head")
     width = images.size(capture.texture)[0]
+    if capture.torchlight.is_file() and not settings.shadow_mask.softened:
+        images.write_data(capture.shadow_mask_auto, np.zeros((width, width), np.float32))
+        report.figure("masked_percent", 0.0)
+        return
     head = read_filmed_head(capture).unfold(min(WORKING_SIZE, width))
     evidence = read_evidence(capture, head)
     shadows = read_frame_shadows(capture, settings)

@@ -18,6 +18,7 @@ from ...capture.files import replacing_folder
 from ...capture.messages import Reporter
 from ...capture.own_head import read_skin
 from ...face.head import read_head
+from ...face.skin_weight import read_skin_weight
 from ...geometry import atlas, baking, meshes
 from ...geometry.meshes import Mesh
 from ...geometry.views import read_views
@@ -26,6 +27,7 @@ from ...settings.settings import Settings
 from . import drawing, scan
 
 OWN_FAR_M = 0.012  # maximum distance between the artist's fitted mesh and the head
+WEIGHT_SIDE = 1024  # texels of the weight of skin that is baked: that of a solve
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
@@ -92,6 +94,7 @@ def _own(capture: Capture, folder: Path, solved: SolvedHead, size: int, report: 
         images.write_data(folder / f"own_specular_albedo{suffix}", specular, bits=16)
         confidence = baking.bake(images.read_mask(maps / "confidence.png"), at)
         images.write_data(folder / f"own_confidence{suffix}", np.where(at.known, confidence, 0))
+        images.write_data(folder / f"own_skin_weight{suffix}", _baked_weight(capture, at))
     (folder / "own_head.obj").write_bytes(capture.own_head.read_bytes())
     baked = {number: entry for number, entry in tiles.items() if entry["with_a_partner_percent"] > 0}
     report.figure("own_tiles", " ".join(baked))
@@ -123,6 +126,7 @@ def _scan(capture: Capture, folder: Path, solved: SolvedHead, full: Mesh, settin
     images.write_srgb(folder / "scan_lit.png", images.linear_to_srgb(colours))
     images.write_srgb(folder / "scan_albedo.png", images.linear_to_srgb(albedo), bits=16)
     images.write_data(folder / "scan_albedo_known.png", at.known.astype(np.float32))
+    images.write_data(folder / "scan_skin_weight.png", _baked_weight(capture, at))
     height = scan.displacement(
         solved.mesh, full, size, lambda done: report.progress(7 + 3 * done, 10, "measuring the displacement")
     )
@@ -140,6 +144,11 @@ def _scan(capture: Capture, folder: Path, solved: SolvedHead, full: Mesh, settin
         report.figure(f"scan_{name}" if name != "displacement_p95_mm" else name, value)
     meaning = "metres, outwards along the normals of head.obj, in its UVs; scale 1, midlevel 0"
     return {**figures, "displacement": meaning}
+
+
+def _baked_weight(capture: Capture, at: baking.TexelPartners) -> np.ndarray:
+    """Return how far each texel follows the skin tone [S, S]; 0 without a partner on the head."""
+    return np.where(at.known, baking.bake(read_skin_weight(capture, WEIGHT_SIDE), at), 0).clip(0, 1)
 
 
 def _known_at(at: baking.TexelPartners, known: np.ndarray) -> baking.TexelPartners:

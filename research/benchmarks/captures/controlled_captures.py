@@ -7,68 +7,43 @@ is made once, and leaves an albedo map in the same UVs.
 """
 
 import time
-from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from core.capture.capture import Capture
 from core.face import template
-from core.face.head import read_head
 from core.imaging import images
 from core.settings.settings import Settings, from_json
-from core.solver.sampler import Sampler, seed_noise
-from core.solver.start import start_solve
-from core.stages.solve import maps, recipe_of
-from core.stages.solve.capture_evidence import read_evidence
-from core.stages.solve.head_cells import make_head_cells
-from core.stages.solve.prior_files import load
 from core.stages.solve.skin_tone import read_given_tone
 
-from ..light.flash_light import write_delit
 from ..light.relit_maps import toned
 from .continued import begin_at_delight, run_stages
 
-load_prior = cache(load)
 EMPTY = np.zeros((64, 64), np.float32)
 
 
 def flash(source: Capture, work: Capture, settings: Settings) -> Capture:
-    """Return the dark room's capture up to its texture, with an empty mask; made once."""
-    if not work.texture_confidence.is_file():
+    """Return the capture with the torch on up to the proposed mask, which is empty; made once."""
+    if not work.shadow_mask_auto.is_file():
         begin_at_delight(source, work.root)
-        write_delit(work, work.root / "without_lamp")
-        dark = from_json({"delight": {"delighter": "folder", "folder": str(work.root / "without_lamp")}}, settings)
-        run_stages(work, dark, "delight", "texture")
-    images.write_data(work.shadow_mask_auto, EMPTY)
+        run_stages(work, lit_by_torch(settings), "delight", "texture", "shadow_mask")
     return work
 
 
-def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict]:
-    """Return the solved albedo, sRGB [S, S, 3], with an even light held throughout, and the seconds."""
-    began, prior = time.monotonic(), load_prior()
-    recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0, linear=0.0)
-    evidence = read_evidence(capture, read_head(capture), settings.solve.size)
-    start = start_solve(
-        prior,
-        evidence,
-        read_given_tone(settings.solve.skin_tone).tensor,
-        evidence.cell_side(settings.solve.grid_cells),
-        recipe,
-        make_head_cells,
-    )
-    sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(settings.seed))
-    state = sampler.sample(start.observations, start.state)
-    diffuse = maps.finish_maps(state, evidence, start).diffuse
-    return images.linear_to_srgb(diffuse), {"seconds": round(time.monotonic() - began, 1)}
+def lit_by_torch(settings: Settings) -> Settings:
+    return from_json({"delight": {"torch": "on"}}, settings)
+
+
+def evenly_lit(settings: Settings) -> Settings:
+    return from_json({"delight": {"delighter": "none"}}, settings)
 
 
 def studio(source: Capture, work: Capture, settings: Settings) -> Capture:
     """Return the studio's capture up to the proposed mask; the mask that counts is empty. Made once."""
     if not work.shadow_mask.is_file():
         begin_at_delight(source, work.root)
-        run_stages(work, from_json({"delight": {"delighter": "none"}}, settings), "delight", "texture", "shadow_mask")
+        run_stages(work, evenly_lit(settings), "delight", "texture", "shadow_mask")
         images.write_data(work.shadow_mask, EMPTY)
     return work
 
@@ -76,7 +51,7 @@ def studio(source: Capture, work: Capture, settings: Settings) -> Capture:
 def by_the_stage(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict]:
     """Return the albedo of the stage solve, sRGB [S, S, 3], its seconds, and the share of the face that is masked."""
     began = time.monotonic()
-    run_stages(capture, from_json({"delight": {"delighter": "none"}}, settings), "solve")
+    run_stages(capture, settings, "solve")
     seconds, proposed = time.monotonic() - began, images.read_mask(capture.shadow_mask_auto)
     face = template.mask("face", len(proposed)) * images.read_data(capture.texture_confidence)[..., 0]
     share = {"proposed_mask_percent": round(100 * float((proposed * face).sum() / face.sum()), 2)}

@@ -5,8 +5,8 @@
     python -m research.benchmarks.light.controlled FOLDER [--only NAME ...] [--json OUT.json]
 
 FOLDER was made by research/benchmarks/captures/people.py (--places wild flash studio); its wild captures are solved.
-Rows are albedo maps in the same UVs: the wild capture's and its texture; of the dark room with a lamp at the camera,
-the frames over the known light (flash_light.py), as texture and solved with that light held; *limit*, the true albedo
+Rows are albedo maps in the same UVs: the wild capture's and its texture; of the room with a torch at the camera,
+the frames that the product makes of it with *Torch* on, as texture and solved; *limit*, the true albedo
 frames as a texture; of sixteen cameras in even light, without delighter or mask, as texture and solved by the stage.
 All share head, prior, quality and true skin tone, and are scored in the wild capture's frames that have a truth.
 FOLDER/controlled keeps maps and figures, so a second run goes on where the first stopped. Missing sets are left out;
@@ -29,7 +29,15 @@ from core.imaging import images
 from core.settings.settings import from_json, preset
 
 from .. import figures
-from ..captures.controlled_captures import as_albedo, by_the_stage, flash, studio, under_even_light, use_true_frames
+from ..captures.controlled_captures import (
+    as_albedo,
+    by_the_stage,
+    evenly_lit,
+    flash,
+    lit_by_torch,
+    studio,
+    use_true_frames,
+)
 from ..captures.people import PEOPLE, skin_tone
 from ..maps.texture import looks_of, score
 
@@ -96,9 +104,9 @@ def measure(folder: Path, name: str) -> dict[str, dict]:
         "wild_texture": ("solved", lambda: (as_albedo(wild, settings), {})),
         "wild": ("solved", lambda: (images.read_srgb(solved), {})),
         "flash_texture": ("flash", lambda: (as_albedo(of("flash"), settings), {})),
-        "flash": ("flash", lambda: under_even_light(of("flash"), settings)),
+        "flash": ("flash", lambda: by_the_stage(of("flash"), lit_by_torch(settings))),
         "studio_texture": ("studio", lambda: (as_albedo(of("studio"), settings), {})),
-        "studio": ("studio", lambda: by_the_stage(of("studio"), settings)),
+        "studio": ("studio", lambda: by_the_stage(of("studio"), evenly_lit(settings))),
         "limit": ("wild", lambda: (as_albedo(of("limit"), settings), {})),
     }
     there = {place: (folder / f"{name}_{place}" / "skin_tone.txt").is_file() for place in ("flash", "studio")}

@@ -22,7 +22,7 @@ from core.settings.settings import Settings
 from core.solver.evidence import REFERENCE_TEXELS
 from core.solver.extensions import border
 from core.solver.recipes import OURS
-from core.solver.start import find_remaining_light, start_solve
+from core.solver.start import expose, find_remaining_light, start_solve
 from core.stages.solve.capture_evidence import read_evidence
 from core.stages.solve.head_cells import make_head_cells
 from core.stages.solve.prior_files import load
@@ -74,7 +74,7 @@ def measure(filmed: Filmed) -> dict:
             ("true", filmed.answer(TRUE)),
         )
     }
-    remaining = np.log(find_remaining_light(evidence, start).numpy().clip(0.05, 4)).mean(0)
+    remaining = np.log(find_remaining_light(expose(evidence, start.exposure), start).numpy().clip(0.05, 4)).mean(0)
     weight = (evidence.weight * evidence.trust * evidence.skin).numpy()
     kinds = {
         "removed": luminance["filmed"] - luminance["delit"],

@@ -5,16 +5,17 @@
 import numpy as np
 
 from ..figures import Figures
+from ..light import torch as torch_rooms
 from ..light.controlled import table
 from ..pages import prose
 from .comparison import by_person
 
 TITLE = "The gap to a controlled capture, and studio input"
 SAYS = "The same people under a flash in a dark room, and in front of sixteen fixed cameras in even light."
-RECORDS = ("controlled",)
+RECORDS = ("controlled", "torch")
 
 
-def sections(controlled: Figures) -> str:
+def sections(controlled: Figures, torch: Figures) -> str:
     mean, people = controlled.mean, controlled.people
     adds = {name: rows.studio.psnr_after_gain - rows.studio_texture.psnr_after_gain for name, rows in people.items()}
     added = list(adds.values())
@@ -22,8 +23,8 @@ def sections(controlled: Figures) -> str:
         """
         The six people of the [gallery](gallery.md), in a dark room with a lamp at the camera (the paper's comparison
         with DoRA), and in front of sixteen fixed cameras in even light. The lamp's light is known and divided out of
-        the frames; its highlight is found from how each place brightens as the lamp moves with the camera
-        (`research/benchmarks/light/flash_light.py`). The solve then holds an even light. *True frames* is the true
+        the frames. These figures are of the fit before *Torch*: one in which the room was dark and the highlight had a
+        strength of its own at every place. The solve then holds an even light. *True frames* is the true
         albedo as a texture: its loss is that of geometry and texture. All maps are scored in the frames of the capture
         in the wild. Moles: 1 is all of their contrast. In the studio no delighter runs and the mask is empty.
         """,
@@ -39,5 +40,22 @@ def sections(controlled: Figures) -> str:
         one gain** ({by_person(adds)}), {mean.studio.psnr - mean.studio_texture.psnr:+.2f} dB without it: such frames
         need no solve. The rows *in the wild, solved* are the maps of [the state of the albedo](state.md), by the same
         solver.
+        """,
+        f"""
+        ## The torch in a room that is not dark
+
+        Light adds up: frames of the dark room and of the person's own light, from the same {len(torch.people)} people's
+        cameras, make a room of any brightness. A share is the room's light over the torch's, mean over the face. Each
+        frame goes through a phone's pipeline (metering of its own, tone curve, local contrast, sharpening) before
+        *Torch* sees it. The last row has the room's light alone, and the default delighter. All maps are
+        textures, not solved, scored in the frames; ± is the deviation over the people. The phone sharpens, so that
+        moles may have more than their contrast.
+        """,
+        torch_rooms.table(torch.people),
+        f"""
+        Against the wild frames of the same cameras the torch gains, in dB: in the dark
+        {by_person(torch_rooms.gains(torch.people, "torch"))}; where the room has three tenths of its light
+        {by_person(torch_rooms.gains(torch.people, "torch, room 30 %"))}; where both are equal
+        {by_person(torch_rooms.gains(torch.people, "torch, room 100 %"))}.
         """,
     )

@@ -214,6 +214,14 @@ def test_the_delighters_shadows_become_the_proposal_and_the_clean_texture_has_no
     assert overlap(mask, ON_CHEEK) > 0.75 and figures["frames_judged_by"] == "shading"
 
 
+def test_nothing_is_proposed_where_the_light_was_known(rendered_head):
+    write_shadows(rendered_head, ON_CHEEK)
+    write_json(rendered_head.torchlight, {})
+    mask, figures = proposal(rendered_head)
+    rendered_head.torchlight.unlink()
+    assert mask.max() == 0 and figures["masked_percent"] == 0
+
+
 def test_a_shadow_on_the_neck_is_proposed_where_the_neck_was_seen(rendered_head):
     """Frames are believed on neck and ears, too; not on the scalp, where hair passes for shadow."""
     neck = blob((0.88, 0.9), 0.05)

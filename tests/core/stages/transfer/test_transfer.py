@@ -181,7 +181,7 @@ def settings_of(**values):
 def test_the_scan_is_delivered_with_its_colours(capture):
     report = Reporter("transfer")
     transfer.run(capture, settings_of(), report)
-    names = "delivery.json scan.obj scan_lit.png scan_albedo.png scan_albedo_known.png displacement.exr"
+    names = "delivery.json scan.obj scan_lit.png scan_albedo.png scan_albedo_known.png scan_skin_weight.png displacement.exr"
     assert {path.name for path in capture.delivery.iterdir()} == set(names.split())
     mesh = meshes.read_obj(capture.delivery / "scan.obj")
     assert atlas.overlap_share(mesh) < 0.01
@@ -199,11 +199,13 @@ def test_tiles_of_the_artists_mesh_are_baked_and_named(capture, target):
     meshes.write_obj(capture.own_head, target)
     capture.own_head_skin.write_text(json.dumps({"skin_triangles": [[0, len(target.faces)]]}))
     transfer.run(capture, settings_of(scan=False), Reporter("transfer"))
-    kinds = product(("diffuse_albedo", "specular_albedo", "normal", "confidence"), (1001, 1002))
+    kinds = product(("diffuse_albedo", "specular_albedo", "normal", "confidence", "skin_weight"), (1001, 1002))
     names = {"delivery.json", "own_head.obj", *(f"own_{kind}.{tile}.png" for kind, tile in kinds)}
     assert {path.name for path in capture.delivery.iterdir()} == names
     assert (capture.delivery / "own_head.obj").read_bytes() == capture.own_head.read_bytes()
     assert images.read_mask(capture.delivery / "own_confidence.1002.png").max() > 0.5
+    weight = images.read_mask(capture.delivery / "own_skin_weight.1002.png")
+    assert weight.max() > 0.99 and weight.min() < 0.01, "skin, and brows or what has no partner"
 
 
 def test_nothing_half_done_stays_and_without_a_scan_there_is_still_a_delivery(capture):
