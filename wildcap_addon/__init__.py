@@ -13,6 +13,7 @@ from . import (
     deliver,
     frame_icons,
     groom,
+    head,
     jobs,
     links,
     make,
@@ -27,12 +28,15 @@ from . import (
     status,
     terminal,
     timings,
+    tones,
 )
 
 ROOMS = (
     frame_icons,
     preferences,
     properties,
+    tones,
+    head,
     panel,
     setup,
     capture,

@@ -21,6 +21,9 @@ CLOSE_UP_KEY = "wildcap_close_up"
 HAIR_COLOUR = "wildcap_colour"
 """Curve attribute of hair: its albedo in the scene's working space."""
 
+NEW_VIEW = 'AgX'
+"""View transform of a scene that gets its first capture, Blender's own default; the property's is that of old files."""
+
 
 def active(context) -> bpy.types.PropertyGroup | None:
     """Return the list's item of the active head, or of the head whose child is active; else the list's active item."""
@@ -77,6 +80,8 @@ def add(context, path: Path) -> bpy.types.PropertyGroup:
     props = context.scene.wildcap
     index = next((i for i, item in enumerate(props.captures) if item.path == str(path)), None)
     if index is None:
+        if not props.captures and not props.is_property_set("view"):
+            props.view = NEW_VIEW
         item = props.captures.add()
         item.name, item.path = Path(path).stem, str(path)
         index = len(props.captures) - 1

@@ -68,11 +68,11 @@ def _towards_working() -> np.ndarray:
     return np.eye(3) if np.abs(matrix - np.eye(3)).max() < ROUNDED else matrix
 
 
-def show_by(scene: bpy.types.Scene, view: str) -> None:
-    """Show a scene by a view transform; if the configuration has none of that name, unchanged."""
+def show_by(scene: bpy.types.Scene, view: str, exposure: float = 0.0) -> None:
+    """Show a scene by a view transform, `exposure` stops brighter; if there is none of that name, unchanged."""
     _choose(scene.view_settings, "view_transform", (view, *VIEWS))
     _choose(scene.view_settings, "look", ("None",))
-    scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
+    scene.view_settings.exposure, scene.view_settings.gamma = exposure, 1.0
 
 
 def of_pictures() -> str:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Head object of a capture: head.obj in the scene with its UVs and its texture, updated in place."""
 
+import contextlib
 from pathlib import Path
 
 import bpy
@@ -9,7 +10,8 @@ import numpy as np
 
 from ..core.capture.capture import Capture
 from ..core.capture.messages import Problem
-from . import captures, colours, data_blocks, node_trees
+from ..core.settings.colour_values import Colour, to_linear
+from . import captures, colours, data_blocks, node_trees, toned_picture, tones
 
 PREVIEW = "WildCap Preview"
 """Name of the image node that shows a running solve on the head."""
@@ -19,6 +21,8 @@ OUTER = "wildcap_outer_polygons"
 HAIR_UVS = "WildCap Hair"
 """UV map of such a mesh with the skin alone, for the roots of hair: sockets continue the lids' maps."""
 
+TEXTURE = "Texture"
+"""Name of the image node that shows the texture until then."""
 TEXTURE_KEY = "wildcap_texture"
 """Custom property of a material that shows the texture until the skin is assembled: its fingerprint as it was made."""
 
@@ -34,6 +38,31 @@ they return a message for the artist, or ''."""
 def complete(obj, capture: Capture) -> str:
     """Run all completers, and return their messages."""
     return " ".join(filter(None, [add(obj, capture) for add in COMPLETERS]))
+
+
+def wear_tone(obj: bpy.types.Object, capture: Capture, chosen: Colour | None) -> None:
+    """Show the texture of a head that has no maps yet in a skin tone: its skin times one gain; None as it is.
+
+    The texture's own brightness and hue are its light's as well as the skin's, so that is a preview of the tone alone.
+    """
+    material = obj.data.materials[0] if obj.data.materials else None
+    nodes = material.node_tree.nodes if material is not None and material.node_tree is not None else {}
+    if material is None or TEXTURE_KEY not in material or TEXTURE not in nodes or "wildcap_skin" in material:
+        return
+    texture = nodes[TEXTURE]
+    with node_trees.keeping_fingerprint(material, TEXTURE_KEY, PREVIEW):
+        node = texture
+        if chosen is not None and capture.texture_png.is_file():
+            gain = np.array(to_linear(chosen)) / toned_picture.mean_of_skin(capture.texture_png)
+            with contextlib.suppress(Problem, OSError):  # a read-only capture
+                picture = toned_picture.write(capture, capture.texture_png, gain)
+                node = toned_picture.put(material, picture, (-320, 580))
+        for link in list(material.node_tree.links):
+            if link.from_node.name in (TEXTURE, toned_picture.NODE):
+                material.node_tree.links.new(node.outputs["Color"], link.to_socket)
+        if node == texture:
+            toned_picture.remove(material)
+            nodes.active = texture
 
 
 def bring_in(context, item) -> bpy.types.Object:
@@ -58,6 +87,7 @@ def bring_in(context, item) -> bpy.types.Object:
     head[captures.HEAD_KEY] = item.path
     head["wildcap_head_time"] = capture.head.stat().st_mtime
     _show_texture(head, capture)
+    tones.show_on(head, capture)
     context.view_layer.update()  # it does not yet know the objects linked and removed above
     for other in list(context.view_layer.objects):
         other.select_set(other == head)
@@ -176,7 +206,7 @@ def _show_texture(head, capture: Capture) -> None:
     tree = node_trees.of(material)
     nodes, links = tree.nodes, tree.links
     node = nodes.new('ShaderNodeTexImage')
-    node.name = node.label = "Texture"
+    node.name = node.label = TEXTURE
     node.location = (-320, 280)
     node.image = image
     shader = next(n for n in nodes if n.type == 'BSDF_PRINCIPLED')
@@ -188,3 +218,11 @@ def _show_texture(head, capture: Capture) -> None:
         head.data.materials[0] = material  # an empty slot
     else:
         head.data.materials.append(material)
+
+
+def register():
+    tones.viewers.append(wear_tone)
+
+
+def unregister():
+    tones.viewers.remove(wear_tone)

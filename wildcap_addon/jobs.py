@@ -21,7 +21,7 @@ from ..core.settings.settings import Settings
 from ..core.worker.background import BackgroundTask
 from ..core.worker.client import Worker
 from ..core.worker.job import read_job, write_job
-from . import batches, captures, incoming, preferences, problems, properties, status, timings
+from . import batches, captures, incoming, preferences, problems, properties, status, timings, tones
 
 INTERVAL_S = 0.2  # between two looks at the workers' messages
 # the folder that holds core/, where the worker starts; nothing is written there
@@ -124,6 +124,7 @@ def _launch(item, goal: str, capture: Capture, then: Callable[[], None] | None, 
     python = preferences.require_python()
     for prepare in before_start:
         prepare()
+    tones.take_in(item)
     path = write_job(capture, settings={**properties.job_settings(item), **once}, **span)
     settings = read_job(path).settings
     environment = preferences.worker_environment(settings.delight.delighter)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from ..core.capture import stages
@@ -26,6 +26,7 @@ class Facts:
     head_time: float = -1.0  # modification time of the head.obj in the scene; -1: none
     maps_time: float = -1.0  # of the material's maps; -1: none assembled
     status: Status | None = None
+    asks_tone: bool = False  # the estimated skin tone is unsure, and none was chosen
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,7 @@ PAINTING = NextStep(
 LOCATE = NextStep(
     "The folder of this capture is not where it was.", "Locate Capture", "wildcap.locate_capture", 'VIEWZOOM'
 )
+ASK_TONE = "The film does not tell the skin tone well: choose a swatch under Skin Tone."
 MAKE = ("Make My Head", "wildcap.make_my_head", 'USER')
 CHOOSE = ("Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
 WORDS = {
@@ -97,6 +99,11 @@ def _continue(facts: Facts, status: Status, translated: Callable[[str], str]) ->
     to_do = [name for name in BEFORE_MASK if status.stages[name] == "to do"]
     if to_do and (status.source or not status.has_head):
         return _reconstruct(facts, status, to_do, translated)
+    step = _finish(facts, status, translated)
+    return replace(step, state=ASK_TONE) if facts.asks_tone else step
+
+
+def _finish(facts: Facts, status: Status, translated: Callable[[str], str]) -> NextStep:
     if facts.head_time < status.head_time:
         return NextStep("The head is ready.", "Bring In Head", "wildcap.bring_in_head", 'IMPORT')
     if not status.has_maps or status.stages["solve"] not in (*FINISHED, "absent"):

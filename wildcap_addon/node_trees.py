@@ -7,6 +7,8 @@ From Blender 5.0 on they always exist, and enabling them is deprecated.
 
 import hashlib
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import bpy
 
@@ -39,6 +41,15 @@ def feed(node: bpy.types.Node, inputs: dict | tuple) -> None:
             node.id_data.links.new(value, node.inputs[name])
         else:
             node.inputs[name].default_value = value
+
+
+@contextmanager
+def keeping_fingerprint(material: bpy.types.Material, key: str, without: str) -> Iterator[None]:
+    """Change a material of ours; one that was as its fingerprint in the custom property `key` has it stays so."""
+    was_ours = key in material and material[key] == fingerprint(material, without)
+    yield
+    if was_ours:
+        material[key] = fingerprint(material, without)
 
 
 def fingerprint(material: bpy.types.Material, without: str) -> str:

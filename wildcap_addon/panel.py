@@ -8,7 +8,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.capture import stages
-from . import batches, captures, jobs, next_step, preferences, problems, status
+from . import batches, captures, jobs, next_step, preferences, problems, status, tones
 from .base_panel import CapturePanel, FoldedPanel, WildcapPanel, region_width
 from .paint import session
 
@@ -126,6 +126,7 @@ def gather(context, item) -> next_step.Facts:
         painting=session.active(),
         head_time=head.get("wildcap_head_time", 0.0) if head else -1.0,
         maps_time=head.get("wildcap_maps_time", -1.0) if head else -1.0,
+        asks_tone=tones.asks(item),
         status=status.of(item),
     )
 

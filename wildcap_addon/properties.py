@@ -11,13 +11,11 @@ from dataclasses import fields
 import bpy
 
 from ..core.capture import stages
-from ..core.capture.messages import Problem
-from ..core.settings import delighter_cards, delivery_presets
+from ..core.settings import delighter_cards, delivery_presets, skin_swatches
 from ..core.settings import settings as core_settings
-from ..core.settings.colour_values import format_skin_tone, parse_skin_tone
 from ..core.settings.setting_values import absolute_path
 from ..core.settings.settings import STAGE_KINDS
-from . import captures, preferences
+from . import captures, preferences, tones
 from . import hdri as worlds
 
 SUBTYPES = {"file": 'FILE_PATH', "file_or_folder": 'FILE_PATH', "folder": 'DIR_PATH'}
@@ -75,6 +73,10 @@ def _apply_quality(self, context):
             setattr(getattr(self, stage), name, getattr(getattr(preset, stage), name))
 
 
+def _hand_on_tone(self, context):
+    tones.hand_on(self)
+
+
 class WILDCAP_PG_capture(bpy.types.PropertyGroup):
     """Item of the scene's list: one capture folder."""
 
@@ -110,6 +112,7 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
     use_skin_tone: bpy.props.BoolProperty(
         name="Set Skin Tone",
         default=False,
+        update=_hand_on_tone,
         description="Use the colour below as the mean skin colour; off: it is estimated from the video",
     )
     skin_tone: bpy.props.FloatVectorProperty(
@@ -119,10 +122,26 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
         min=0,
         max=1,
         default=(0.69, 0.54, 0.45),
+        update=_hand_on_tone,
         description="Mean colour of the facial skin without lips, brows and stubble, as the eye sees it (sRGB)",
+    )
+    skin_warmth: bpy.props.FloatProperty(
+        name="Warmer",
+        min=-skin_swatches.WARMEST,
+        max=skin_swatches.WARMEST,
+        get=tones.warmth,
+        set=tones.set_warmth,
+        description="How much redder and less blue the skin is than it was filmed, in deviations among people of one "
+        "lightness",
+    )
+    numbered_tone: bpy.props.FloatVectorProperty(
+        name="Numbered Tone", size=3, options={'HIDDEN'}, description="Colour of a tone that was given by its number"
     )
     estimated_tone: bpy.props.FloatVectorProperty(
         name="Estimated Tone", size=3, options={'HIDDEN'}, description="Last estimated tone"
+    )
+    estimated_after: bpy.props.StringProperty(
+        name="Estimated After", options={'HIDDEN'}, description="When the solve was finished that it came after"
     )
     tone_group: bpy.props.StringProperty(name="Tone Group", options={'HIDDEN'}, description="Name of the tone's group")
     tone_source: bpy.props.StringProperty(
@@ -222,6 +241,15 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
             ),
         ],
     )
+    exposure: bpy.props.FloatProperty(
+        name="Exposure",
+        soft_min=-5,
+        soft_max=5,
+        min=-20,
+        max=20,
+        precision=2,
+        description="Stops by which pictures are shown brighter than the lights are set; the linear EXR stays as it is",
+    )
     turns: bpy.props.EnumProperty(
         name="Rotate",
         default='HEAD',
@@ -247,7 +275,7 @@ def job_settings(item: WILDCAP_PG_capture) -> dict:
     stage_settings = {
         stage: {f.name: _value(getattr(item, stage), f) for f in fields(kind)} for stage, kind in STAGE_KINDS.items()
     }
-    stage_settings["solve"]["skin_tone"] = _tone(item) if item.use_skin_tone else "auto"
+    stage_settings["solve"]["skin_tone"] = tones.text(item)
     return {**stage_settings, "seed": item.seed, "device": device(item)}
 
 
@@ -257,23 +285,8 @@ def take(item: WILDCAP_PG_capture, quality: str, new_settings: core_settings.Set
     for stage, kind in STAGE_KINDS.items():
         for f in fields(kind):
             setattr(getattr(item, stage), f.name, getattr(getattr(new_settings, stage), f.name))
-    tone = _parsed_tone(new_settings.solve.skin_tone)
-    item.use_skin_tone = tone is not None
-    item.skin_tone = tone or item.skin_tone
+    tones.take(item, new_settings.solve.skin_tone)
     item.seed, item.device = new_settings.seed, new_settings.device
-
-
-def _tone(item: WILDCAP_PG_capture) -> str:
-    """Return the skin tone as text; unchanged, it is the very text that `take` got, so that nothing becomes stale."""
-    recorded, current = _parsed_tone(item.solve.skin_tone), format_skin_tone(item.skin_tone)
-    return item.solve.skin_tone if recorded is not None and format_skin_tone(recorded) == current else current
-
-
-def _parsed_tone(text: str) -> tuple[float, float, float] | None:
-    try:
-        return parse_skin_tone(text)
-    except Problem:
-        return None
 
 
 def _value(group, field):

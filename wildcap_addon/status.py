@@ -15,7 +15,7 @@ import bpy
 from ..core.capture import consent, freshness, mask_edit, newest_maps, report, stages
 from ..core.capture.capture import Capture
 from ..core.capture.messages import Problem
-from . import captures, properties
+from . import captures, properties, tones, undo
 from .batch_watch import modified_ns
 
 INTERVAL_S = 1.0  # between two looks at the capture's folder
@@ -41,6 +41,7 @@ class Status:
     render: str = ""
     whole_solve: str = ""  # why an edited part of the mask cannot be solved alone; '' if it can
     interrupted: bool = False  # a solve stopped early and can continue from its checkpoint
+    torch_percent: int | None = None  # of the light, where the frames were delit as lit by a torch
     findings: tuple[dict, ...] = ()  # problems of the capture, from core.capture.report.findings
     problem: Problem | None = None
     missing: bool = False  # the folder does not exist
@@ -67,6 +68,7 @@ def refresh(context) -> None:
     for item in context.scene.wildcap.captures:
         root = captures.root(item)
         if root in _wanted or item == active:
+            tones.take_in(item)
             capture = captures.folder(item)
             stamp = _stamp(capture, repr(properties.job_settings(item)))
             if root not in _known or _known[root][0] != stamp:
@@ -91,6 +93,7 @@ def look(capture: Capture, settings) -> Status:
         remedy = "Check the disk, or open the capture from its new place."
         return Status(problem=_unreadable(capture, error.strerror or error, remedy))
     maps_time = max(map(_time, maps))
+    delit = record["stages"].get("delight", {}).get("figures", {})
     render = max(capture.renders.glob("[!.]*.png"), key=_time, default=Path())
     solve = verdicts["solve"].state
     return Status(
@@ -106,6 +109,7 @@ def look(capture: Capture, settings) -> Status:
         has_head=capture.head.is_file(),
         head_time=_time(capture.head),
         has_mask=capture.shadow_mask.is_file(),
+        torch_percent=delit.get("torch_share_percent") if delit.get("delighter") == "torch" else None,
         findings=tuple(report.findings(record)),
         interrupted=_interrupted(capture),
         has_maps=all(path.is_file() for path in maps),
@@ -183,6 +187,8 @@ def _tick() -> float:
         root = captures.root(item)
         if root not in _wanted or root in _looking:
             continue
+        if tones.take_in(item):
+            undo.push("Skin Tone")
         _looking.add(root)
         threading.Thread(
             target=_look_aside,

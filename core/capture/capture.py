@@ -48,6 +48,7 @@ class Capture:
         self.own_head = self.root / "own_head.obj"
         self.own_head_skin = self.root / "own_head.json"
         self.delit = self.root / "delit"
+        self.torchlight = self.delit / "torchlight.json"  # the light that was known; absent if it was not
         self.consent = self.root / "consent.json"  # to send frames to a service
         self.switchlight = self.root / "switchlight"  # paid answers
         self.texture = self.root / "texture.exr"
@@ -60,10 +61,12 @@ class Capture:
         self.shadow_mask = self.root / "shadow_mask.png"
         self.protect_mask = self.root / "protect_mask.png"
         self.shadow_mask_edges = self.root / "shadow_mask_edges.png"  # snapped to edges, until the artist accepts it
+        self.skin_tone = self.root / "skin_tone.json"  # the artist's choice; absent if there never was one
         self.mask_history = self.root / "mask_history"
         self.maps = self.root / "maps"
         self.solved = self.maps / "solved.safetensors"  # state for a later solve of an edited part
         self.irises = self.maps / "irises.json"  # absent if the eyes were closed
+        self.skin_weight = self.maps / "skin_weight.png"  # what follows the skin tone; absent from older solves
         self.maps_4k = self.root / "maps_4k"
         self.delivery = self.root / "delivery"
         self.exports = self.root / "exports"  # default folder of deliveries
@@ -112,7 +115,7 @@ class Capture:
 
     @property
     def source(self) -> Path | None:
-        """Video or folder of photographs, which may be gone; None if none was chosen."""
+        """Video, photograph or folder of photographs, which may be gone; None if none was chosen."""
         return freshness.source_of(self.root, self.read())
 
     def refuse_inside(self, source: str | Path) -> None:

@@ -49,11 +49,12 @@ def _is_finding(finding) -> bool:
 
 
 def _is_file(stamp) -> bool:
-    """Return whether a value is [name, size, content hash]. No system allows a slash in a name; other rules differ."""
+    """Return whether a value is [name, size, content hash]; a rig's pictures have their camera's folder before it."""
     if not isinstance(stamp, list) or len(stamp) != 3:
         return False
     name, size, digest = stamp
-    named = isinstance(name, str) and "/" not in name and name not in ("", ".", "..")
+    parts = name.split("/") if isinstance(name, str) else []  # no system allows a slash in a name; other rules differ
+    named = 1 <= len(parts) <= 2 and not {"", ".", ".."} & set(parts)
     return named and is_number(size, 0) and isinstance(digest, str)
 
 

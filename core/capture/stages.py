@@ -22,7 +22,7 @@ class Stage:
 
     Optional inputs are read if they exist. `shared` names the shared settings (seed, device) that the result depends
     on; code_key.py derives from the sources which code and shipped files it depends on. `on_device`: it can compute on
-    a GPU.
+    a GPU. `estimates`: a tool that runs after it, whose figures are recorded with its own; if it fails, they are not.
     """
 
     name: str
@@ -33,6 +33,7 @@ class Stage:
     optional_reads: tuple[str, ...] = ()
     shared: tuple[str, ...] = ()
     on_device: bool = False
+    estimates: str = ""
 
 
 MAPS = (
@@ -55,7 +56,7 @@ PARTS = "texture_parts.png"
 
 STAGES = (
     # Extract upright sRGB frames of one exposure from the video or photographs, and select the views.
-    Stage(name="frames", label="Frames", module="core.stages.frames", writes=("frames/",)),
+    Stage(name="frames", label="Frames", module="core.stages.frames", writes=("frames/",), estimates="skin_tone"),
     # Solve calibrated, upright, metric cameras, or import them from another program.
     Stage(
         name="cameras",
@@ -168,9 +169,11 @@ TOOLS = (
         name="skin_tone",
         label="Skin Tone",
         module="core.stages.solve.tone",
-        reads=SOLVE_INPUTS,
+        reads=("capture.json",),
+        optional_reads=("frames/", *SOLVE_INPUTS),
         on_device=True,
     ),
+    Stage(name="colours", label="Colours", module="core.stages.frames.colour_previews"),
     Stage(name="white_point", label="White Point", module="core.stages.solve.white_point", reads=("frames/",)),
     Stage(
         name="self_test",

@@ -10,16 +10,21 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-from ..capture import delivery_plan, freshness, provenance, stages
+import numpy as np
+
+from ..capture import delivery_plan, freshness, provenance, stages, tone_choice
 from ..capture.capture import Capture
 from ..capture.delivery_plan import PACKING, TEXTURES, DeliveryPlan
 from ..capture.files import replacing_folder, write_json
 from ..capture.messages import Problem, Reporter
 from ..capture.stages import advise_again
+from ..capture.tone_choice import ToneChange
 from ..face import template
 from ..face.head import read_head
+from ..face.skin_weight import measure_tone, read_bare_weight, read_skin_weight
 from ..geometry import meshes
 from ..imaging import images
 from ..settings.delivery_presets import HAIR, SCAN_MAPS, MapPicture
@@ -27,6 +32,12 @@ from ..settings.settings import Settings
 from . import checks, maps, wavefront
 from .wavefront import HEAD_TILE
 
+OWN_MAPS = {
+    "albedo": "diffuse_albedo",
+    "normal": "normal",
+    "specular": "specular_albedo",
+    "skin_weight": "skin_weight",
+}
 UNIT_M = {"m": 1.0, "cm": 0.01}  # metres in a unit
 
 
@@ -44,6 +55,12 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             f"{plan.format.title} is written by Blender.", "Choose OBJ here, or deliver from the add-on's panel."
         )
     tiles, roughness = _tiles(capture, plan, settings), settings.deliver.roughness / 100
+    change = tone_choice.find_change(capture.read(), settings.solve.skin_tone, partial(measure_tone, capture))
+    if change is not None and any("skin_weight" not in paths for paths in tiles.values()) and plan.what != "head":
+        raise Problem(
+            "The skin tone was changed after the solve, and this mesh was made before that could be baked into it.",
+            advise_again("transfer"),
+        )
     # a damaged mesh must not be delivered
     if mesh == capture.head:
         read_head(capture)
@@ -51,9 +68,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         meshes.read_obj(mesh)
     delivery_plan.discard(plan)
     with replacing_folder(plan.staged) as folder:
-        written, size = _write_maps(folder, capture, plan, tiles, settings, report)
+        written, size = _write_maps(folder, capture, plan, tiles, settings, change, report)
         report.progress(len(tiles), len(tiles), "writing the provenance")
-        write_json(folder / delivery_plan.PROVENANCE, provenance.collect(capture, plan, settings, report.check))
+        facts = provenance.collect(capture, plan, settings, report.check, change)
+        write_json(folder / delivery_plan.PROVENANCE, facts)
         if settings.deliver.whole:
             wavefront.write(mesh, folder / plan.mesh, plan, written, roughness)
             provenance.finish(folder)
@@ -80,6 +98,7 @@ def _write_maps(
     plan: DeliveryPlan,
     tiles: dict[int, dict[str, Path]],
     settings: Settings,
+    change: ToneChange | None,
     report: Reporter,
 ) -> tuple[list[dict], int]:
     """Write the maps of all UV tiles; return {"file", "tile", "kind", "slot"} of each, and their largest side."""
@@ -88,7 +107,8 @@ def _write_maps(
     mean, on_head = _mean_specular(capture), plan.what == "head"
     written, sizes = [], [0]
     for i, (tile, paths) in enumerate(tiles.items()):
-        sources = maps.Sources(paths, size, roughness, mean, UNIT_M[plan.unit], on_head)
+        toned = {} if change is None else _toned(capture, paths, change, on_head)
+        sources = maps.Sources(paths, size, roughness, mean, UNIT_M[plan.unit], on_head, toned)
         available = [picture for picture in _pictures(plan, settings) if sources.has(picture)]
         for j, picture in enumerate(available):
             number = f".{tile}" if plan.numbered or len(tiles) > 1 else ""
@@ -98,6 +118,19 @@ def _write_maps(
             written.append({"file": f"{TEXTURES}/{name}", "tile": tile, "kind": picture.kind, "slot": picture.slot})
         sizes.append(sources.size)
     return written, max(sizes)
+
+
+def _toned(capture: Capture, paths: dict[str, Path], change: ToneChange, on_head: bool) -> dict[str, maps.Toned]:
+    """Return what follows a change of the skin tone: the albedo by the weight of skin, and that without hair."""
+    if on_head:
+        weights = {"albedo": partial(read_skin_weight, capture), "clean": read_bare_weight}
+    else:
+        weights = {"albedo": partial(_read_weight, paths["skin_weight"])}
+    return {name: maps.Toned(change.gain, weight) for name, weight in weights.items()}
+
+
+def _read_weight(path: Path, size: int) -> np.ndarray:
+    return images.resize(images.read_mask(path), size, size).clip(0, 1)
 
 
 def _pictures(plan: DeliveryPlan, settings: Settings) -> list[MapPicture]:
@@ -116,13 +149,13 @@ def _tiles(capture: Capture, plan: DeliveryPlan, settings: Settings) -> dict[int
     """Return UV tile -> its existing maps, by the names of maps.Sources. Raises Problem without an albedo."""
     delivery = capture.delivery
     if plan.what == "scan":
-        files = {HEAD_TILE: {"albedo": delivery / "scan_albedo.png", "lit": delivery / "scan_lit.png"}}
+        names = {"albedo": "scan_albedo.png", "lit": "scan_lit.png", "skin_weight": "scan_skin_weight.png"}
+        files = {HEAD_TILE: {name: delivery / file for name, file in names.items()}}
     elif plan.what == "own_mesh":
         numbers = [int(path.suffixes[-2][1:]) for path in sorted(delivery.glob("own_diffuse_albedo.????.png"))]
         files = {
             number or HEAD_TILE: {
-                name: delivery / f"own_{file}{f'.{number}' if number else ''}.png"
-                for name, file in (("albedo", "diffuse_albedo"), ("normal", "normal"), ("specular", "specular_albedo"))
+                name: delivery / f"own_{file}{f'.{number}' if number else ''}.png" for name, file in OWN_MAPS.items()
             }
             for number in numbers or [0]
         }

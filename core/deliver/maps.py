@@ -8,6 +8,8 @@ A map that the capture lacks is left out.
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,7 @@ from ..capture import skin_regions
 from ..capture.delivery_plan import DeliveryPlan
 from ..capture.messages import Problem
 from ..capture.stages import advise_remaking
+from ..capture.toned_albedo import apply_tone
 from ..face import template
 from ..imaging import images
 from ..settings.delivery_presets import COLOUR, NORMAL, MapPicture
@@ -29,18 +32,43 @@ STRIP_ROWS = 256
 """Rows encoded at once, to save memory."""
 
 
+@dataclass(frozen=True)
+class Toned:
+    """Linear gain [3] of the skin, and its weight [S, S] by the side S of the map that it is for."""
+
+    gain: tuple[float, float, float]
+    weight: Callable[[int], np.ndarray]
+
+    def apply(self, albedo: np.ndarray) -> np.ndarray:
+        """Return linear albedo [S, S, 3] with its skin in the chosen tone, float32; a strip at a time."""
+        weight, gain = self.weight(len(albedo))[..., None], np.array(self.gain, np.float32)
+        result = np.empty_like(albedo, np.float32)
+        for row in range(0, len(albedo), STRIP_ROWS):
+            rows = slice(row, row + STRIP_ROWS)
+            result[rows] = apply_tone(albedo[rows], weight[rows], gain)
+        return result
+
+
 class Sources:
     """Maps of one UV tile, read on demand, at one size.
 
     `paths`: albedo, normal, specular, clean, lit ... -> file. `roughness` is that of the cheeks, `mean` the specular
     map's on facial skin, `unit` in metres. `regions`: the UVs are those of the built-in head, whose other regions are
-    known.
+    known. `toned`: what follows a skin tone that was chosen after the solve, by the same names.
     """
 
     def __init__(
-        self, paths: dict[str, Path], size: int, roughness: float, mean: float, unit: float = 1.0, regions: bool = False
+        self,
+        paths: dict[str, Path],
+        size: int,
+        roughness: float,
+        mean: float,
+        unit: float = 1.0,
+        regions: bool = False,
+        toned: dict[str, Toned] | None = None,
     ):
         self.paths, self.roughness, self.mean, self.unit, self.regions = paths, roughness, mean, unit, regions
+        self.toned = toned or {}
         stored = [images.size(path)[0] for name, path in paths.items() if name in ("albedo", "normal")]
         self.size = min([size, *stored])
         self._read: dict[str, np.ndarray] = {}
@@ -80,7 +108,10 @@ class Sources:
         if name not in self._read:
             linear = dict.fromkeys(("albedo", "clean", "lit"), images.read_linear)
             read = {**linear, "normal": images.read_normals}.get(name, images.read_mask)
-            self._read[name] = _sized(_square(self.paths[name], read(self.paths[name])), self.size, name == "normal")
+            pixels = _square(self.paths[name], read(self.paths[name]))
+            if name in self.toned:
+                pixels = self.toned[name].apply(pixels)
+            self._read[name] = _sized(pixels, self.size, name == "normal")
         return self._read[name]
 
 
@@ -141,6 +172,7 @@ def _stored_alike(picture: MapPicture, sources: Sources, plan: DeliveryPlan, nam
     right = plan.colour == "srgb" if picture.kind == COLOUR else plan.normals == "opengl"
     return (
         right
+        and name not in sources.toned
         and plan.pictures == "png16"
         and source.suffix == ".png"
         and images.bits(source) == 16

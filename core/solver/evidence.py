@@ -45,7 +45,8 @@ class Evidence:
     bare: skin of neck and ears as well; trust: less than 1 if a texel's colour says little of the light; protected:
     what the artist keeps out of M; edge: how far M's border lies on a visible shadow edge; filmed: brightness in the
     frames over usual skin's; added: what the artist added to the proposal for M; shadow_colour [3]: of what shadows
-    take of the light, over its mean, zeros if unknown; missing: the share of the light that M's border says is missing.
+    take of the light, over its mean, zeros if unknown; missing: the share of the light that M's border says is missing;
+    hair: how probable beard and head hair are, None if unknown.
     """
 
     texture: torch.Tensor
@@ -63,6 +64,7 @@ class Evidence:
     shadow_colour: tuple[float, float, float] = (0.0, 0.0, 0.0)
     extent: Extent = Extent()
     missing: torch.Tensor | None = None
+    hair: torch.Tensor | None = None
 
     @property
     def size(self) -> int:
@@ -84,14 +86,11 @@ def soften_mask(mask: np.ndarray) -> np.ndarray:
     return np.clip((faded - 0.02) / 0.96, 0, 1)
 
 
-def make_observations(
-    evidence: Evidence, exposure: float, cell: float, multiple: int, recipe: Recipe
-) -> dict[int, Observation]:
+def make_observations(evidence: Evidence, cell: float, multiple: int, recipe: Recipe) -> dict[int, Observation]:
     """Return the sampler's observations by coarsening factor.
 
-    Maps coarser than a quarter of REFERENCE_TEXELS are left out: the prior has not seen them. `exposure` multiplies the
-    texture, `cell` is a grid cell's side in texels of REFERENCE_TEXELS, the network takes sides of a `multiple` of
-    texels.
+    Maps coarser than a quarter of REFERENCE_TEXELS are left out: the prior has not seen them. `cell` is a grid cell's
+    side in texels of REFERENCE_TEXELS, the network takes sides of a `multiple` of texels.
     """
     cells, extent = grid_cells(cell), evidence.extent
     levels = {}
@@ -101,7 +100,7 @@ def make_observations(
             continue
         names = "weight", "alpha", "trust", "edge", "protected", "added"
         weight, alpha, trust, edge, protected, added = (_resized(getattr(evidence, name), size) for name in names)
-        texture = _resized(evidence.texture * evidence.weight, size) / weight.clamp_min(1e-4) * exposure
+        texture = _resized(evidence.texture * evidence.weight, size) / weight.clamp_min(1e-4)
         texture = blur_maps(texture) if recipe.blur else texture
         normal = torch.nn.functional.normalize(_resized(evidence.normal, size), dim=0)
         inside = (alpha > (0.5 if recipe.hard_mask else 0)).numpy().astype(np.uint8)

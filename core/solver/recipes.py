@@ -25,6 +25,9 @@ class Recipe:
     # x_0^ref, of the skin tone: the prior's mean face; "nearest" of its reference skins; or "uniform", the tone
     # everywhere
     reference: str = "mean"
+    # linear tone that every skin is sampled in, so that a wrong tone is a gain and nothing else; None: the skin's own.
+    # Of L* 35 to 75, 65 was best for all groups of tone: dark ones gained 0.3 to 0.7 dB, light ones lost nothing
+    working_tone: tuple[float, float, float] | None = (0.50, 0.31, 0.22)
 
     # guidance by the texture
     guidance: str = "dps"  # or "proximal": closed form on the denoised map, without the network's gradient
@@ -94,6 +97,7 @@ _PLAIN = replace(
     seam=0.0,
     smooth=0.0,
     linear=0.0,
+    working_tone=None,
 )
 
 RECIPES = {

@@ -16,7 +16,7 @@ class Solution:
     """End of a solve of the whole map.
 
     denoised: x_0 [1, 7, S, S] before the maps' own gain; painted, alpha [S, S]: the mask as it was painted and as it
-    was used; tone: of the skin, linear [3]; gain [3] of the albedo; exposure of the texture; local [3, C, C]: as in
+    was used; tone: of the skin, linear [3]; gain [3] of the albedo; exposure [3] of the texture; local [3, C, C]: as in
     start.Start; settled: true if the split found the global light.
     """
 
@@ -26,6 +26,6 @@ class Solution:
     alpha: torch.Tensor
     tone: torch.Tensor
     gain: torch.Tensor
-    exposure: float
+    exposure: torch.Tensor
     local: torch.Tensor
     settled: bool

@@ -33,21 +33,28 @@ class NoSkinError(ValueError):
 class Start:
     """Start of a run.
 
-    tone: the skin's, linear RGB [3]; recipe: the chosen one, adapted to this capture's light; reference:
-    x_0^ref [1, 7, S, S]; exposure: factor of the texture in `observations` (by coarsening factor), so that its shading
-    is about one; alpha [S, S]: M as it is used; state: before the first step; marks: the skin's own, kept from the
-    light; local [3, C, C], natural log: light that other captures of the person reveal beside theta, zeros without any.
+    tone: the skin's, linear RGB [3]; working_tone [3]: the one that the sampler works in; recipe: the chosen one,
+    adapted to this capture's light; reference: x_0^ref [1, 7, S, S], of the working tone; exposure [3]: factor of the
+    texture in `observations` (by coarsening factor), so that its shading is about one; alpha [S, S]: M as it is used;
+    state: before the first step; marks: the skin's own, kept from the light; local [3, C, C], natural log: light that
+    other captures of the person reveal beside theta, zeros without any.
     """
 
     tone: torch.Tensor
+    working_tone: torch.Tensor
     recipe: Recipe
     reference: torch.Tensor
-    exposure: float
+    exposure: torch.Tensor
     alpha: torch.Tensor
     observations: dict[int, Observation]
     state: State
     marks: tuple[Mark, ...] = ()
     local: torch.Tensor = field(default_factory=lambda: torch.zeros(3, 1, 1))
+
+    @property
+    def tint(self) -> torch.Tensor:
+        """Factor [3] that brings the working tone to the skin's."""
+        return self.tone / self.working_tone
 
 
 @dataclass(frozen=True)
@@ -76,11 +83,12 @@ def start_solve(
     `cell` is the side of a cell of V in texels of a 1024 map; `head_cells` is `split_captures`'s, for the head whose
     UVs the evidence is in. Raises NoSkinError.
     """
-    lit = weigh_lit_skin(evidence)
-    x_ref = make_reference(prior, tone, evidence, recipe.reference)
+    lit, working_tone = weigh_lit_skin(evidence), choose_working_tone(tone, recipe)
+    x_ref = make_reference(prior, working_tone, evidence, recipe.reference)
     albedo = albedo_of(x_ref)
-    exposure = match_exposure(albedo, evidence.texture, lit)
-    texture = evidence.texture * exposure
+    exposure = match_exposure(albedo, evidence.texture, lit, grey=recipe.working_tone is None)
+    evidence = expose(evidence, exposure)
+    texture = evidence.texture
     trusted = evidence.weight * (1 if recipe.trusting else evidence.trust)
     weight = trusted * (1 - evidence.alpha) if recipe.fitted else lit  # skin reveals one even light best
     weight = weight if weight.sum() >= 1 else trusted
@@ -88,7 +96,7 @@ def start_solve(
     local = torch.zeros(3, 1, 1)
     if recipe.linear:
         captures = (evidence, *other_captures)
-        references = [albedo_of(make_reference(prior, tone, each, recipe.reference)) for each in captures]
+        references = [albedo_of(make_reference(prior, working_tone, each, recipe.reference)) for each in captures]
         split = split_captures(list(map(make_shapes, captures, references)), head_cells, check=callbacks.check)
         light = split.light(evidence.normal)
         if weighted_deviation(light.log(), lit) < recipe.linear:
@@ -97,7 +105,8 @@ def start_solve(
             recipe, lights.glob = settle_recipe(recipe), _fit_split(light, local, texture, albedo, evidence, lit)
         else:
             recipe = free_recipe(recipe)
-    start = Start(tone, recipe, x_ref, exposure, evidence.alpha, {}, State(0, None, x_ref, lights), local=local)
+    state = State(0, None, x_ref, lights)
+    start = Start(tone, working_tone, recipe, x_ref, exposure, evidence.alpha, {}, state, local=local)
     return _lay_out(prior, evidence, start, cell, callbacks)
 
 
@@ -133,10 +142,14 @@ def start_again(
     That mask stays where `near` [S, S] is 0, and is the evidence's where it is 1. `cell` is the side of a cell of V in
     texels of a 1024 map.
     """
-    x_ref = make_reference(prior, earlier.tone, evidence, recipe.reference)
+    working_tone = choose_working_tone(earlier.tone, recipe)
+    x_ref = make_reference(prior, working_tone, evidence, recipe.reference)
+    evidence = expose(evidence, earlier.exposure)
     recipe = settle_recipe(recipe) if earlier.settled else free_recipe(recipe)
     state = State(0, None, earlier.denoised, earlier.lights)
-    start = Start(earlier.tone, recipe, x_ref, earlier.exposure, evidence.alpha, {}, state, local=earlier.local)
+    start = Start(
+        earlier.tone, working_tone, recipe, x_ref, earlier.exposure, evidence.alpha, {}, state, local=earlier.local
+    )
     return _lay_out(prior, evidence, start, cell, callbacks, lambda alpha: torch.lerp(earlier.alpha, alpha, near))
 
 
@@ -148,7 +161,10 @@ def _lay_out(
     callbacks: Callbacks,
     mask: Callable[[torch.Tensor], torch.Tensor] = lambda alpha: alpha,
 ) -> Start:
-    """Complete a start with M as it is used, the marks that light must not explain, and the observations under both."""
+    """Complete a start with M as it is used, the marks that light must not explain, and the observations under both.
+
+    The evidence's texture is at the start's exposure.
+    """
     recipe = start.recipe
     evidence = replace(evidence, texture=evidence.texture / enlarge_field(start.local, evidence.size).exp())
     light = find_remaining_light(evidence, start)
@@ -162,14 +178,14 @@ def _lay_out(
     marks: list[Mark] = []
     if recipe.protect_marks:
         evidence, marks = protect_marks(evidence, callbacks.witness)
-    observations = make_observations(evidence, start.exposure, cell, prior.multiple, recipe)
+    observations = make_observations(evidence, cell, prior.multiple, recipe)
     return replace(start, alpha=evidence.alpha, marks=tuple(marks), observations=observations)
 
 
 def find_remaining_light(evidence: Evidence, start: Start) -> torch.Tensor:
-    """Return the texture over the lit reference face [3, S, S]: about 1, less where light is missing."""
+    """Return the texture, at the start's exposure, over the lit reference face [3, S, S]: about 1, less in shadows."""
     shading = shade(start.state.lights.glob, shading_basis(evidence.normal))
-    return evidence.texture * start.exposure / (shading * albedo_of(start.reference).clamp_min(1e-3)).clamp_min(1e-3)
+    return evidence.texture / (shading * albedo_of(start.reference).clamp_min(1e-3)).clamp_min(1e-3)
 
 
 def weigh_lit_skin(evidence: Evidence) -> torch.Tensor:
@@ -189,15 +205,34 @@ def weighted_deviation(log: torch.Tensor, weight: torch.Tensor) -> float:
     return float(mean_tone(away**2, weight).mean().sqrt())
 
 
-def match_exposure(albedo: torch.Tensor, texture: torch.Tensor, weight: torch.Tensor) -> float:
-    """Return the factor that makes a texture [3, H, W] as bright as an albedo under a weight [H, W]."""
-    return float(mean_tone(albedo, weight).mean() / mean_tone(texture, weight).mean().clamp_min(1e-6))
+def choose_working_tone(tone: torch.Tensor, recipe: Recipe) -> torch.Tensor:
+    """Return the linear tone [3] that the sampler works in for a skin of a tone [3]."""
+    return tone if recipe.working_tone is None else torch.tensor(recipe.working_tone)
+
+
+def match_exposure(
+    albedo: torch.Tensor, texture: torch.Tensor, weight: torch.Tensor, grey: bool = False
+) -> torch.Tensor:
+    """Return the factors [3] that give a texture [3, H, W] the mean of an albedo under a weight [H, W].
+
+    `grey`: they are one, and the texture keeps its colour.
+    """
+    wanted, given = mean_tone(albedo, weight), mean_tone(texture, weight)
+    if grey:
+        wanted, given = wanted.mean().expand(3), given.mean().expand(3)
+    return wanted / given.clamp_min(1e-6)
+
+
+def expose(evidence: Evidence, exposure: torch.Tensor) -> Evidence:
+    """Return the evidence with its texture times an exposure [3]."""
+    return replace(evidence, texture=evidence.texture * exposure[:, None, None])
 
 
 def make_shapes(evidence: Evidence, albedo: torch.Tensor) -> Shapes:
     """Return the split's input of a capture: facial skin outside of M, with brows, lips and beards counting little."""
     weight = weigh_lit_skin(evidence) * evidence.trust
-    return Shapes(evidence.texture * match_exposure(albedo, evidence.texture, weight), albedo, evidence.normal, weight)
+    exposed = expose(evidence, match_exposure(albedo, evidence.texture, weight))
+    return Shapes(exposed.texture, albedo, evidence.normal, weight)
 
 
 def mean_tone(albedo: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:

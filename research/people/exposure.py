@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A phone's view of a lit face: surroundings, metered exposure, and the cast that white balance leaves.
 
-The meter weighs the face against the surroundings and holds the brightest skin below white, so the brightness of skin
-in a picture says little of the skin. The light is a black body's; automatic white balance takes most of its colour out
-and errs by a few degrees (recovery errors: Gijsenij, Gevers and van de Weijer, "Computational color constancy", 2011).
+The meter weighs the face, in some phones nothing else, against the surroundings and holds the brightest skin below
+white, so the brightness of skin in a picture says little of the skin. The light is a black body's; automatic white
+balance takes most of its colour out and errs by a few degrees (recovery errors: Gijsenij, Gevers and van de Weijer,
+"Computational color constancy", 2011).
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ def phone_exposure(rng: np.random.Generator, skin: np.ndarray, light: np.ndarray
     elsewhere = np.exp(rng.normal(0, 0.45)) * np.exp(rng.normal(0, 0.4, (SURFACES, 1)))
     behind = reflectance * elsewhere * light * np.exp(rng.normal(0, 0.06, 3))
     share = rng.dirichlet(np.ones(SURFACES))[:, None]
-    face = rng.uniform(0.25, 0.85)  # weight of the face in the meter
+    face = rng.uniform(0.25, 1.0)  # weight of the face in the meter
     metered = face * float((skin @ LUMINANCE).mean()) + (1 - face) * float((share * behind).sum(0) @ LUMINANCE)
     level = MIDDLE_GREY * 2 ** rng.normal(0.5, 0.5) / metered
     level = min(level, rng.uniform(0.85, 1.15) / float(np.percentile((skin * cast).max(1), 98)))

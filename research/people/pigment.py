@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 
 from core.geometry import raster
+from core.settings.colour_values import LUMINANCE_WEIGHTS
 
 # volume fraction of melanosomes in the epidermis; Jacques: 0.013 ... 0.43 from very light to very dark skin
 MELANIN_RANGE = 0.002, 0.9
@@ -46,7 +47,7 @@ DEOXYGENATED = np.array([
 # fmt: on
 # linear, D65 (IEC 61966-2-1)
 XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB (IEC 61966-2-1)
+LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 TABLE = 512  # entries per axis; cv2.remap rounds to 1/32 of an entry
 
 

@@ -35,7 +35,8 @@ class Portrait:
     for skin and one for lips, highlights, clipping and camera curve included, so that nothing of the pigment is in it;
     shadow [S, S] in [0, 1]: share of the lamps' light that is blocked or turned away, 0 without lamps; strong in [0,
     1]: share of that light in all irradiance, facing it; head, skin and face, with brows, beard, lips and eyes, without
-    what hangs over it [S, S] in [0, 1]; fitted [P].
+    what hangs over it [S, S] in [0, 1]; fitted [P]; card [3]: linear colour of a white surface before the face that
+    looks where it does, None if nobody held one.
     """
 
     srgb: np.ndarray
@@ -47,6 +48,7 @@ class Portrait:
     skin: np.ndarray
     face: np.ndarray
     fitted: FittedLight
+    card: np.ndarray | None = None
 
 
 def sample_sight(stage: LightStage, skin: Skin, rng: np.random.Generator, size: int) -> Sight:

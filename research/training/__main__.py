@@ -17,7 +17,7 @@ from core.capture.messages import Problem
 from .networks import run_command
 
 NETWORKS = ("delighter", "eyes", "parser", "prior", "upscaler")
-OTHERS = ("carry", "glasses", "tones", "traits")
+OTHERS = ("carry", "glasses", "irises", "tones", "traits")
 
 
 def main(arguments: list[str]) -> int:

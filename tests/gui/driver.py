@@ -166,6 +166,10 @@ def park():
     yield 0.3
 
 
+TO_THE_TOP = -60
+"""Turns of the wheel that bring the longest sidebar back to its top."""
+
+
 def scroll(steps: int):
     """Turns the wheel over the sidebar, back for negative steps, and has it drawn."""
     sidebar = region('UI')
@@ -209,8 +213,10 @@ def press(command: str, options: str = ""):
 
 
 def find(command: str, options: str = ""):
-    """Where that button is: the cursor goes down the sidebar and Blender says what would be copied at each place."""
-    for _ in range(3):
+    """Where that button is: the cursor goes down the sidebar and Blender says what would be copied at each place. If it
+    is not to be seen, the sidebar is scrolled to its top and then down."""
+    for steps in (0, TO_THE_TOP, 16, 16):
+        yield from scroll(steps)
         sidebar = region('UI')
         for share in (0.25, 0.45, 0.75, 0.83):  # three buttons may share a row, and the last may be a mere icon
             x = sidebar.x + sidebar.width * share
@@ -226,6 +232,7 @@ def find(command: str, options: str = ""):
 def lead(command: str):
     """Clicks the sidebar's first button, which must be the one that runs this operator: what a newcomer does who reads
     nothing."""
+    yield from scroll(TO_THE_TOP)
     sidebar = region('UI')
     for y in range(sidebar.y + sidebar.height - 4, sidebar.y + 4, -11):
         position = sidebar.x + sidebar.width * 0.5, y

@@ -58,6 +58,8 @@ def test_what_is_dropped_becomes_captures(addon, tmp_path):
         bpy.ops.wildcap.choose_video('INVOKE_DEFAULT', directory=str(folder), files=files)
     assert [Capture(path).source for path in paths()] == [tmp_path / "one.mp4", tmp_path / "TWO.MOV", shots]
     assert bpy.context.scene.wildcap.active_index == 2
+    bpy.ops.wildcap.choose_video(filepath=str(shots / "b.JPG"), alone=True)
+    assert Capture(paths()[-1]).source == shots / "b.JPG", "not all in its folder"
     for path, words in (
         (tmp_path / "notes.txt", "neither a video nor a photograph"),
         (tmp_path, "no photographs"),

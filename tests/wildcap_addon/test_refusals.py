@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the add-on says when something an artist did, lost or damaged is in the way, where no other file tests it."""
 
+from queue import SimpleQueue
 from unittest.mock import Mock
 
 import pytest
@@ -111,6 +112,7 @@ def test_a_folder_that_cannot_be_looked_at(addon, capture, monkeypatch):
     monkeypatch.setattr(status.Capture, "read", Mock(side_effect=OSError(5, "Input/output error")))
     assert "cannot be read (Input/output error)" in status.look(folder, None).problem.problem
     monkeypatch.setattr(status, "look", lambda *_: 1 / 0)
+    monkeypatch.setattr(status, "_found", SimpleQueue())  # a test before this one may have left a look of its own
     status._look_aside(str(capture), "", folder, None)
     assert "cannot be read (division by zero)" in status._found.get_nowait()[2].problem.problem
 

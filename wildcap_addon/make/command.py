@@ -25,7 +25,9 @@ def _core(*words: str | Path) -> int:
 
 
 def _of_run(kind) -> None:
-    kind.add_argument("source", help="a video, or a folder of photographs; - for the one the capture was made from")
+    kind.add_argument(
+        "source", help="a video, a photograph, or a folder of photographs; - for the one the capture was made from"
+    )
     _of_solve(kind)
 
 

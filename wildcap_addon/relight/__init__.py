@@ -4,8 +4,8 @@
 
 import bpy
 
-from .. import terminal
-from . import command, compare, operators, output, panel
+from .. import terminal, tones
+from . import command, compare, operators, output, panel, tone
 
 _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *compare.CLASSES, *panel.CLASSES))
 
@@ -14,9 +14,11 @@ def register():
     _register()
     output.register()
     terminal.commands.extend(command.COMMANDS)
+    tones.viewers.append(tone.wear)
 
 
 def unregister():
+    tones.viewers.remove(tone.wear)
     terminal.forget(command.COMMANDS)
     output.unregister()
     _unregister()

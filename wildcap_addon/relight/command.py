@@ -9,11 +9,11 @@ from . import headless
 
 
 def _relight(options) -> list[Path]:
-    return headless.render_relit(options.capture, options.lights or headless.ALL, options.resolution, options.samples)
+    return headless.render_relit(options.capture, options.lights or headless.ALL, **_picture(options))
 
 
 def _contact_sheet(options) -> list[Path]:
-    return [headless.render_contact_sheet(options.capture, options.resolution, options.samples, options.view)]
+    return [headless.render_contact_sheet(options.capture, **_picture(options))]
 
 
 def _turntable(options) -> list[Path]:
@@ -23,31 +23,31 @@ def _turntable(options) -> list[Path]:
         options.turns.upper(),
         options.frames,
         options.film,
-        options.resolution,
-        options.samples,
+        **_picture(options),
     )
     return [folder]
 
 
-def _add_sizes(parser) -> None:
+def _picture(options) -> dict:
+    return {name: getattr(options, name) for name in ("resolution", "samples", "view", "exposure")}
+
+
+def _add_picture(parser) -> None:
     parser.add_argument("capture", type=Path)
     parser.add_argument("--resolution", type=int, default=512, help="side in pixels")
     parser.add_argument("--samples", type=int, default=32)
+    parser.add_argument("--view", choices=("Standard", "AgX"), default="Standard", help="view transform")
+    parser.add_argument("--exposure", type=float, default=0.0, metavar="STOPS", help="brighten the pictures")
 
 
 def _add_relight(parser) -> None:
-    _add_sizes(parser)
+    _add_picture(parser)
     choices = f"{', '.join(headless.ALL)}, or one of Blender's worlds; default: all presets"
     parser.add_argument("lights", nargs="*", metavar="LIGHT", help=choices)
 
 
-def _add_contact_sheet(parser) -> None:
-    _add_sizes(parser)
-    parser.add_argument("--view", choices=("Standard", "AgX"), default="Standard")
-
-
 def _add_turntable(parser) -> None:
-    _add_sizes(parser)
+    _add_picture(parser)
     parser.add_argument("--light", default=headless.ALL[0])
     parser.add_argument("--turns", choices=("head", "light"), default="head")
     parser.add_argument("--frames", type=int, default=48)
@@ -56,6 +56,6 @@ def _add_turntable(parser) -> None:
 
 COMMANDS = (
     Command("relight", "a picture and a linear EXR per light", _add_relight, _relight),
-    Command("contact_sheet", "all lights in one picture", _add_contact_sheet, _contact_sheet),
+    Command("contact_sheet", "all lights in one picture", _add_picture, _contact_sheet),
     Command("turntable", "the head or the light once around", _add_turntable, _turntable),
 )

@@ -6,7 +6,7 @@ import bpy
 
 from ...core.capture.messages import Problem
 from ...core.capture.newest_maps import find_newest_maps
-from .. import captures, head
+from .. import captures, head, tones
 from ..base_operator import BaseOperator
 from . import material
 
@@ -53,6 +53,7 @@ class WILDCAP_OT_compare(BaseOperator, bpy.types.Operator):
         if not path.is_file():
             raise Problem(f"This capture has no {name} to show.", REMEDIES[self.show == 'SKIN'])
         skin(context).node_tree.nodes[ALBEDO].image = head.load_image(path)
+        tones.show(item)
 
 
 def skin(context) -> bpy.types.Material | None:

@@ -31,23 +31,35 @@ class Turn:
 
 
 def render_relit(
-    capture_folder: Path, names: Iterable[str] = ALL, resolution: int = 640, samples: int = 32
+    capture_folder: Path,
+    names: Iterable[str] = ALL,
+    resolution: int = 640,
+    samples: int = 32,
+    view: str = colours.VIEWS[0],
+    exposure: float = 0.0,
 ) -> list[Path]:
     """Render a capture's head under each light to renders/NAME.png and the linear NAME.exr; return the PNGs.
 
-    Empties the open file first. Raises Problem if the capture has no head or maps, or there is no such light.
+    view, exposure: view transform of the PNG, and stops by which it is brighter. Empties the open file first. Raises
+    Problem if the capture has no head or maps, or there is no such light.
     """
     chosen = [light_of(name) for name in names]
     obj, renders = _open_to_render(capture_folder)
-    return [render_light(obj, renders, light, RenderSettings(resolution, samples)) for light in chosen]
+    settings = RenderSettings(resolution, samples, view=view, exposure=exposure)
+    return [render_light(obj, renders, light, settings) for light in chosen]
 
 
 def render_contact_sheet(
-    capture_folder: Path, resolution: int = 512, samples: int = 32, view: str = colours.VIEWS[0]
+    capture_folder: Path,
+    resolution: int = 512,
+    samples: int = 32,
+    view: str = colours.VIEWS[0],
+    exposure: float = 0.0,
 ) -> Path:
-    """Render all presets to renders/contact_sheet.png, by a view transform; otherwise as `render_relit`."""
+    """Render all presets to renders/contact_sheet.png; otherwise as `render_relit`."""
     obj, renders = _open_to_render(capture_folder)
-    return contact_sheet.render(obj, renders, True, RenderSettings(resolution, samples, view=view))
+    settings = RenderSettings(resolution, samples, view=view, exposure=exposure)
+    return contact_sheet.render(obj, renders, True, settings)
 
 
 def render_turntable(
@@ -58,11 +70,14 @@ def render_turntable(
     film: bool = False,
     resolution: int = 512,
     samples: int = 32,
+    view: str = colours.VIEWS[0],
+    exposure: float = 0.0,
 ) -> Path:
     """Render a capture's head or its light once around to renders/turntable/; otherwise as `render_relit`."""
     light = light_of(name)
     obj, renders = _open_to_render(capture_folder)
-    return turntable(obj, renders, light, Turn(turns, frames, film), RenderSettings(resolution, samples), True)
+    settings = RenderSettings(resolution, samples, view=view, exposure=exposure)
+    return turntable(obj, renders, light, Turn(turns, frames, film), settings, True)
 
 
 def turntable(obj, renders: Path, light: str | Hdri, turn: Turn, settings: RenderSettings, wait: bool) -> Path:

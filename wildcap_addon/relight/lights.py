@@ -3,7 +3,9 @@
 """Lights for a first look at a head of any place, turn and size: six presets of lamps under a sky, or surroundings.
 
 Directions are the head's: +X its left, -Y where it looks, +Z up. Distances are in head radii, powers are for a head of
-the reference radius.
+the reference radius. They are set by a grey ball in the head's place, as by an incident light meter: where the light is
+strongest, its 18 % are rendered as 18 %, so that skin shows as light as it is. The rims are dimmer, for at a grazing
+angle all skin mirrors them.
 """
 
 from dataclasses import dataclass
@@ -44,36 +46,36 @@ class LightingPreset:
 PRESETS = {
     "three_point": LightingPreset(
         (
-            Lamp("Key", (-0.9, -1.0, 0.7), 16.0, (1.0, 0.96, 0.92), size=3.0),
-            Lamp("Fill", (1.2, -0.8, 0.1), 4.0, (0.92, 0.96, 1.0), size=4.0),
-            Lamp("Rim", (0.9, 1.2, 0.5), 6.0, size=2.0),
+            Lamp("Key", (-0.9, -1.0, 0.7), 6.46, (1.0, 0.96, 0.92), size=3.0),
+            Lamp("Fill", (1.2, -0.8, 0.1), 1.61, (0.92, 0.96, 1.0), size=4.0),
+            Lamp("Rim", (0.9, 1.2, 0.5), 2.42, size=2.0),
         ),
-        sky.even((0.02, 0.02, 0.022)),
+        sky.even((0.00807, 0.00807, 0.00888)),
     ),
     "window": LightingPreset(
-        (Lamp("Window", (-1.3, -0.45, 0.25), 22.0, (0.93, 0.97, 1.0), size=5.0, distance=5.0),),
-        sky.even((0.012, 0.011, 0.01)),
+        (Lamp("Window", (-1.3, -0.45, 0.25), 5.64, (0.93, 0.97, 1.0), size=5.0, distance=5.0),),
+        sky.even((0.00308, 0.00282, 0.00256)),
     ),
     "sun": LightingPreset(
-        (Lamp("Sun", (0.75, -1.0, 0.7), 4.2, (1.0, 0.9, 0.76)),),
-        sky.Sky((0.14, 0.21, 0.34), (0.2, 0.24, 0.29), (0.13, 0.11, 0.085)),
+        (Lamp("Sun", (0.75, -1.0, 0.7), 3.01, (1.0, 0.9, 0.76)),),
+        sky.Sky((0.1, 0.151, 0.244), (0.143, 0.172, 0.208), (0.0932, 0.0789, 0.061)),
     ),
-    "overcast": LightingPreset((), sky.Sky((2.1, 2.16, 2.25), (0.7, 0.72, 0.75), (0.26, 0.24, 0.22))),
+    "overcast": LightingPreset((), sky.Sky((1.37, 1.41, 1.47), (0.457, 0.47, 0.489), (0.17, 0.157, 0.143))),
     "rim": LightingPreset(
         (
-            Lamp("Left Rim", (1.0, 0.85, 0.3), 18.0, (1.0, 0.97, 0.94), size=1.6, distance=5.0),
-            Lamp("Right Rim", (-1.0, 0.95, 0.35), 14.0, (0.9, 0.95, 1.0), size=1.6, distance=5.0),
-            Lamp("Front", (0.1, -1.0, 0.35), 1.6, size=4.0),
+            Lamp("Left Rim", (1.0, 0.85, 0.3), 4.8, (1.0, 0.97, 0.94), size=3.0, distance=5.0),
+            Lamp("Right Rim", (-1.0, 0.95, 0.35), 3.7, (0.9, 0.95, 1.0), size=3.0, distance=5.0),
+            Lamp("Front", (0.1, -1.0, 0.35), 2.3, size=4.0),
         ),
-        sky.even((0.006, 0.006, 0.007)),
+        sky.even((0.00532, 0.00532, 0.00621)),
     ),
     "coloured": LightingPreset(
         (
-            Lamp("Teal", (-1.2, -0.7, 0.25), 12.0, (0.05, 0.62, 0.9), size=2.5),
-            Lamp("Magenta", (1.15, -0.55, 0.2), 12.0, (1.0, 0.1, 0.42), size=2.5),
-            Lamp("Above", (0.0, -0.5, 1.3), 3.0, size=2.0),
+            Lamp("Teal", (-1.2, -0.7, 0.25), 10.4, (0.05, 0.62, 0.9), size=2.5),
+            Lamp("Magenta", (1.15, -0.55, 0.2), 10.4, (1.0, 0.1, 0.42), size=2.5),
+            Lamp("Above", (0.0, -0.5, 1.3), 2.6, size=2.0),
         ),
-        sky.even((0.008, 0.007, 0.012)),
+        sky.even((0.00692, 0.00606, 0.0104)),
     ),
 }
 """Presets by the identifiers of properties.LIGHTS, which has their names and tooltips."""

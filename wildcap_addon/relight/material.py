@@ -3,6 +3,7 @@
 """Assemble Material: put the capture's maps, each in its colour space, into WildCap Skin on the head, in place.
 
 UV Map -> Albedo (sRGB), Specular (Non-Color), Normal (Non-Color) -> Normal Map -> WildCap Skin -> Material Output
+          Skin Weight (Non-Color), how far each place follows another skin tone (tone.py) -> WildCap Skin
           Displacement (Non-Color, if the scan gave one) and the regions' attribute -> WildCap Skin
 """
 
@@ -14,19 +15,24 @@ import bpy
 from ...core.capture.capture import Capture
 from ...core.capture.messages import Problem
 from ...core.capture.newest_maps import find_newest_maps
-from .. import captures, data_blocks, head, node_trees
+from .. import captures, data_blocks, head, node_trees, toned_picture, tones
 from . import asset, node_group, regions
 
 KEY = "wildcap_skin"
+SKIN, ALBEDO, WEIGHT = "WildCap Skin", "WildCap Albedo", "WildCap Skin Weight"
 IMAGES = (
     ("WildCap Albedo", "diffuse_albedo.png", False),
     ("WildCap Specular", "specular_albedo.png", True),
     ("WildCap Normal", "normal.png", True),
 )
 """Node, its file, and whether that holds data rather than colours."""
+WEIGHT_IMAGE = (WEIGHT, "skin_weight.png", True)
 DISPLACEMENT = ("WildCap Displacement", "displacement.exr", True)
+WEIGHT_PLACE = (-540, -900)
 MADE = "wildcap_made"
 """Custom property of the material: its fingerprint as it was assembled."""
+WORN = "wildcap_tone"
+"""Custom property of the material: the skin tone of its maps, sRGB."""
 SET = "wildcap_set"
 """Custom property of the material: the values that were set; one that differs now is the artist's."""
 
@@ -46,7 +52,10 @@ def assemble(context, item) -> tuple[bpy.types.Material, str]:
     before = material[SET].to_dict() if SET in material else {}
     regions.write(obj.data)
     height = capture.delivery / DISPLACEMENT[1]
-    _build(material, {path.name: path for path in (*maps, height) if path.is_file()}, obj)
+    _build(material, {path.name: path for path in (*maps, height, capture.skin_weight) if path.is_file()}, obj)
+    worn = tones.of_maps(capture)
+    if worn is not None:
+        material[WORN] = worn.solved
     scattering = node_group.SCATTERING_M * data_blocks.scale_of(obj)
     _set(material, {"Specular Amount": _specular_amount(capture), "Subsurface Scale": scattering}, before)
     obj["wildcap_maps_time"] = max(path.stat().st_mtime for path in maps)
@@ -54,7 +63,25 @@ def assemble(context, item) -> tuple[bpy.types.Material, str]:
         notice = head.complete(obj, capture)
     finally:  # the maps are in, whatever is wrong with the rest of the head
         material[MADE] = node_trees.fingerprint(material, head.PREVIEW)
+    tones.show_on(obj, capture)
     return material, notice
+
+
+def feed_weight(material: bpy.types.Material, capture: Capture) -> None:
+    """Feed the skin how far each place follows the tone, if nothing does; for old solves by a picture in the .blend."""
+    tree = material.node_tree
+    if tree.nodes[SKIN].inputs["Skin"].is_linked:
+        return
+    uv = tree.nodes.get("WildCap UV")
+    if capture.skin_weight.is_file() and uv is not None:
+        _add_map(material, WEIGHT_IMAGE, {WEIGHT_IMAGE[1]: capture.skin_weight}, uv, WEIGHT_PLACE)
+    else:
+        node = _node(tree, WEIGHT, 'ShaderNodeTexImage', WEIGHT_PLACE)
+        node.image = toned_picture.weight_image(material.name, capture)
+        node.extension = 'EXTEND'
+        if uv is not None:
+            _link(tree, uv.outputs["UV"], node.inputs["Vector"])
+    _link(tree, tree.nodes[WEIGHT].outputs["Color"], tree.nodes[SKIN].inputs["Skin"])
 
 
 def is_edited(obj) -> bool:
@@ -117,6 +144,7 @@ def _build(material, paths: dict, obj) -> None:
     uv.uv_map = obj.data.uv_layers[0].name
     for row, image in enumerate((*IMAGES, DISPLACEMENT)):
         _add_map(material, image, paths, uv, (-540, 300 - 300 * row))
+    _add_map(material, WEIGHT_IMAGE, paths, uv, WEIGHT_PLACE)
     normal = _node(tree, "WildCap Normal Map", 'ShaderNodeNormalMap', (-200, -300))
     normal.space, normal.uv_map = 'TANGENT', uv.uv_map
     attribute = _node(tree, "WildCap Regions", 'ShaderNodeAttribute', (-200, -520))
@@ -131,6 +159,7 @@ def _build(material, paths: dict, obj) -> None:
         ("WildCap Normal Map", "Normal", skin, "Normal"),
         ("WildCap Skin", "BSDF", output, "Surface"),
         ("WildCap Regions", factor, skin, "Region"),
+        (WEIGHT, "Color", skin, "Skin"),
     ]
     if DISPLACEMENT[0] in tree.nodes:
         links += [(DISPLACEMENT[0], "Color", skin, "Height"), ("WildCap Skin", "Displacement", output, "Displacement")]
@@ -162,7 +191,7 @@ def _add_map(material, image: tuple[str, str, bool], paths: dict, uv, location: 
     node = _node(tree, name, 'ShaderNodeTexImage', location)
     node.image = head.load_image(paths[file_name], is_data)
     if is_new:  # the map's upper and lower border are crown and neck, which must not mix
-        node.interpolation, node.extension = 'Cubic', 'EXTEND'
+        node.interpolation, node.extension = 'Linear' if image == WEIGHT_IMAGE else 'Cubic', 'EXTEND'
         if image == DISPLACEMENT:
             material.displacement_method = 'DISPLACEMENT'  # the surface itself moves, once the socket says so
     _link(tree, uv.outputs["UV"], node.inputs["Vector"])

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Node group WildCap Skin: a Principled BSDF set up as skin, with the few sockets that an artist adjusts.
 
-    Albedo, compensated for what scattering loses -> Base Color
+    Albedo x Tone, as far as Skin says, compensated for what scattering loses -> Base Color
     Specular x Specular Amount, clamped -> Specular IOR Level        Roughness x (1 + Region) -> Roughness
     Oil, where Region is smoother than the cheeks -> Coat Weight
     Height, Midlevel, Displacement -> Displacement, in the object's own units
@@ -17,7 +17,7 @@ from ...core.capture import skin_regions
 from ..data_blocks import find
 
 NAME = "WildCap Skin"
-VERSION = 4
+VERSION = 5
 
 SCATTERING_M = 0.003
 """Mean free path of red light."""
@@ -62,12 +62,21 @@ INPUTS = (
         (0.0, 1.0),
         "A thin shining film on nose, forehead, lids and lips. No capture tells how much there is: 0 is none",
     ),
+    (
+        "Tone",
+        'NodeSocketColor',
+        (1.0, 1.0, 1.0, 1.0),
+        None,
+        "Times the albedo of skin: from the tone of the maps to the one that was chosen",
+    ),
+    ("Skin", FLOAT, 1.0, (0.0, 1.0), "How far a place follows the tone: 1 is skin, 0 is hair"),
 )
 """Name, socket type, default, range, tooltip; what the maps feed comes first."""
 OUTPUTS = (("BSDF", 'NodeSocketShader'), ("Displacement", 'NodeSocketVector'))
 
 NODES = (
     ("WildCap Input", 'NodeGroupInput', (-700, 0)),
+    ("WildCap Tone", 'ShaderNodeMix', (-560, 340)),
     ("WildCap Given Back", 'ShaderNodeMix', (-400, 340)),
     ("WildCap Specular Level", 'ShaderNodeMath', (-400, 80)),
     ("WildCap Regions", 'ShaderNodeMath', (-400, -120)),
@@ -98,8 +107,11 @@ LINKS = (
     ("WildCap Oily", 0, "WildCap Coat", 0),
     ("WildCap Input", "Oil", "WildCap Coat", 1),
     ("WildCap Coat", 0, "WildCap Principled", "Coat Weight"),
+    ("WildCap Input", "Skin", "WildCap Tone", MIX_FACTOR),
+    ("WildCap Input", "Albedo", "WildCap Tone", MIX_A),
+    ("WildCap Input", "Tone", "WildCap Tone", MIX_B),
     ("WildCap Input", "Subsurface", "WildCap Given Back", MIX_FACTOR),
-    ("WildCap Input", "Albedo", "WildCap Given Back", MIX_A),
+    ("WildCap Tone", MIX_RESULT, "WildCap Given Back", MIX_A),
     ("WildCap Given Back", MIX_RESULT, "WildCap Principled", "Base Color"),
     ("WildCap Input", "Normal", "WildCap Principled", "Normal"),
     ("WildCap Input", "IOR", "WildCap Principled", "IOR"),
@@ -162,8 +174,10 @@ def _set_up(nodes: dict[str, bpy.types.Node]) -> None:
         shader.inputs["Coat Roughness"].default_value = SEBUM_ROUGHNESS
     shader.subsurface_method = 'RANDOM_WALK_SKIN'
     shader.inputs["Subsurface Radius"].default_value = SCATTERING_RGB
-    back = nodes["WildCap Given Back"]
-    back.data_type, back.blend_type = 'RGBA', 'MULTIPLY'
+    tone, back = nodes["WildCap Tone"], nodes["WildCap Given Back"]
+    for mix in (tone, back):
+        mix.data_type, mix.blend_type = 'RGBA', 'MULTIPLY'
+    tone.clamp_result = True
     back.inputs[MIX_B].default_value = (*(1 / share for share in GIVEN_BACK), 1)
     nodes["WildCap Displacement"].space = 'OBJECT'  # heights grow with the object's scale
 

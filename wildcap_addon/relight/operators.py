@@ -6,7 +6,7 @@ import bpy
 
 from .. import captures, colours, hdri
 from ..base_operator import BaseOperator, HeadOperator
-from . import contact_sheet, headless, material, output
+from . import contact_sheet, headless, material, metering, output
 from .picture import RenderSettings
 
 
@@ -62,6 +62,18 @@ class WILDCAP_OT_render(Render, bpy.types.Operator):
         headless.render_light(obj, folder, hdri.light(props), look(props), bpy.app.background)
 
 
+class WILDCAP_OT_expose(Render, bpy.types.Operator):
+    """Set Exposure so that this face is as bright in the mean as middle grey in the chosen light, and no more than half
+    a percent of it is burnt out"""
+
+    bl_idname = "wildcap.expose"
+    bl_label = "Expose for This Face"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    def render(self, obj, folder, props):
+        props.exposure = metering.expose(obj, hdri.light(props), props.hdri_rotation)
+
+
 class WILDCAP_OT_contact_sheet(Render, bpy.types.Operator):
     """Render the head in all of the lights, joined to one picture: renders/contact_sheet.png"""
 
@@ -85,7 +97,13 @@ class WILDCAP_OT_turntable(Render, bpy.types.Operator):
 
 def look(props) -> RenderSettings:
     """Return the scene's settings for a picture."""
-    return RenderSettings(props.resolution, props.samples, props.hdri_rotation, props.view)
+    return RenderSettings(props.resolution, props.samples, props.hdri_rotation, props.view, props.exposure)
 
 
-CLASSES = (WILDCAP_OT_assemble_material, WILDCAP_OT_render, WILDCAP_OT_contact_sheet, WILDCAP_OT_turntable)
+CLASSES = (
+    WILDCAP_OT_assemble_material,
+    WILDCAP_OT_render,
+    WILDCAP_OT_expose,
+    WILDCAP_OT_contact_sheet,
+    WILDCAP_OT_turntable,
+)

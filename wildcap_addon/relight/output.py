@@ -233,7 +233,8 @@ def _picture(path: Path) -> None:
 
 def view_label(scene: bpy.types.Scene) -> str:
     """Return what pictures of this scene say of their colours."""
-    return f"View transform: {scene.view_settings.view_transform}"
+    stops = round(scene.view_settings.exposure, 2)
+    return f"View transform: {scene.view_settings.view_transform}" + (f", {stops:+g} stops" if stops else "")
 
 
 def register():

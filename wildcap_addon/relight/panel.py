@@ -34,6 +34,8 @@ class WILDCAP_PT_relight(CapturePanel, bpy.types.Panel):
         column.prop(props, "resolution")
         column.prop(props, "samples")
         layout.row().prop(props, "view", expand=True)
+        layout.prop(props, "exposure")
+        layout.operator("wildcap.expose")
         buttons = side_by_side(layout, tight)
         buttons.operator("wildcap.render")
         buttons.operator("wildcap.contact_sheet")

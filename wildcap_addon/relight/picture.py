@@ -29,10 +29,11 @@ class RenderSettings:
     samples: int
     turn: float = 0.0  # of the light about the head, radians
     view: str = colours.VIEWS[0]  # view transform
+    exposure: float = 0.0  # stops, of the view alone
 
     def scene(self, obj: bpy.types.Object, light: str | Hdri) -> bpy.types.Scene:
         """Return the relight scene with this head."""
-        return set_up_scene(obj, light, self.resolution, self.samples, self.turn, self.view)
+        return set_up_scene(obj, light, self.resolution, self.samples, self.turn, self.view, self.exposure)
 
 
 def set_up_scene(
@@ -42,11 +43,12 @@ def set_up_scene(
     samples: int,
     turn: float = 0.0,
     view: str = colours.VIEWS[0],
+    exposure: float = 0.0,
 ) -> bpy.types.Scene:
     """Return the relight scene with only this head and what it wears, framed and lit by a preset or a picture.
 
-    turn: of the light about the head, in radians, counter-clockwise from above; view: the view transform, which the
-    picture's file names.
+    turn: of the light about the head, in radians, counter-clockwise from above; view, exposure: the view transform and
+    its stops, which the picture's file names.
     """
     scene = find(bpy.data.scenes, SCENE) or bpy.data.scenes.new(SCENE)
     output.let_go(scene)
@@ -67,7 +69,7 @@ def set_up_scene(
     render.threads_mode, render.threads = now.render.threads_mode, now.render.threads
     scene.cycles.samples = samples
     scene.cycles.use_denoising = has_denoiser()
-    colours.show_by(scene, view)
+    colours.show_by(scene, view, exposure)
     _label(scene)
     return scene
 

@@ -35,6 +35,14 @@ def write(mesh: bpy.types.Mesh) -> None:
     attribute.data.foreach_set("value", roughness)
 
 
+def in_face(mesh: bpy.types.Mesh) -> np.ndarray:
+    """Return which polygons [P] of a mesh with the built-in head's UVs are in the face."""
+    mask = load_pixels(MASKS / "face.png")[..., 0]
+    uvs = read_field(mesh.uv_layers[0].data, "uv", 2)[read_field(mesh.polygons, "loop_start", kind=np.int32)]
+    texel = np.clip((uvs * len(mask)).astype(int), 0, len(mask) - 1)
+    return mask[texel[:, 1], texel[:, 0]] > 0.5
+
+
 @cache
 def _shares() -> np.ndarray:
     """Return the attribute as a map [S, S], rows from the bottom as v goes."""

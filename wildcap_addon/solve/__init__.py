@@ -5,11 +5,11 @@
 import bpy
 
 from .. import incoming
-from . import eyedropper, live, operators, panel, white_card
+from . import eyedropper, live, operators, panel, swatch_icons, tone_panel, white_card
 
 RESULTS = incoming.Results(live.take, live.waits)
 _register, _unregister = bpy.utils.register_classes_factory(
-    (*operators.CLASSES, *eyedropper.CLASSES, *white_card.CLASSES, *panel.CLASSES)
+    (*operators.CLASSES, *eyedropper.CLASSES, *white_card.CLASSES, *tone_panel.CLASSES, *panel.CLASSES)
 )
 
 
@@ -22,3 +22,4 @@ def unregister():
     incoming.on_results.remove(RESULTS)
     _unregister()
     live.forget()
+    swatch_icons.forget()

@@ -11,7 +11,7 @@ from mathutils import Vector
 from mathutils.geometry import barycentric_transform
 
 from ...core.capture.messages import Problem
-from .. import captures, colours
+from .. import captures, colours, tones
 from ..base_operator import BaseOperator
 from ..data_blocks import read_pixels
 
@@ -59,8 +59,7 @@ class WILDCAP_OT_pick_skin_tone(BaseOperator, bpy.types.Operator):
 
     def work(self, context):
         item = captures.require(context)
-        item.skin_tone = colour_at(shown_image(captures.require_head(context, item)), self.uv)
-        item.use_skin_tone = True
+        tones.choose(item, colour_at(shown_image(captures.require_head(context, item)), self.uv))
 
 
 def uv_under(window, event, head) -> tuple[float, float] | None:

@@ -5,7 +5,7 @@
 import bpy
 
 from ...core.capture.messages import Problem
-from .. import captures, jobs, status, undo
+from .. import captures, jobs, status, tones, undo
 from ..base_operator import BaseOperator, JobOperator
 from . import live
 
@@ -71,10 +71,11 @@ def begin(context, item, **once) -> None:
 
 
 def set_tone(root: str, figures: dict) -> None:
-    """Store the estimated tone in the capture's settings, in all scenes."""
+    """Mark the estimated tone in the capture's settings, in all scenes; a tone that was chosen stays chosen."""
     for item in captures.of_root(root):
-        item.use_skin_tone, item.skin_tone = True, figures["skin_tone_srgb"]
-        item.estimated_tone = figures["skin_tone_srgb"]
+        if not item.use_skin_tone:
+            item.skin_tone = figures["skin_tone_srgb"]
+        item.estimated_tone, item.estimated_after = figures["skin_tone_srgb"], tones.solve_time(root)
         item.tone_group = figures.get("skin_tone_group", "")
         item.tone_source = figures.get("skin_tone_source", "")
         item.tone_deviation = figures.get("skin_tone_deviation_l", 0.0)

@@ -64,6 +64,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         other_uvs, prior = layout.fit_layout(capture, head, filmed, prior, report)
         evidence, recipe = other_uvs.evidence(filmed, recipe.released_boxes), free_recipe(recipe)
     _check_often(prior, report)
+    if capture.torchlight.is_file() and not evidence.alpha.any():
+        recipe = even_light(recipe)
 
     if settings.edited_part and other_uvs is None:
         edited = solve_edited(capture, head, settings, recipe, prior, evidence, report)
@@ -75,20 +77,24 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             return
 
     conditions = mask_edit.conditions(capture, settings)
-    tone = resolve_skin_tone(capture, head, settings, filmed, report)
+    tone = resolve_skin_tone(capture, settings, filmed, report)
     tell_skin_tone(tone, settings, report)
     start = _start(capture, None if other_uvs else head, settings, prior, evidence, tone.tensor, recipe, report)
     stored = capture.checkpoints / "solve.safetensors"
     key = _run_key(evidence, settings, start)
-    state = _sample(capture, settings, start, prior.of_tone(start.tone), stored, key, report)
+    state = _sample(capture, settings, start, prior.of_tone(start.working_tone), stored, key, report)
 
-    solved = delivered = maps.finish_maps(state, evidence, start)
-    if other_uvs is not None:
-        delivered = other_uvs.returned(solved, filmed, state.lights, start.exposure, start.tone)
+    solved = maps.finish_maps(state, evidence, start)
+    if other_uvs is None:
+        solved = delivered = maps.place_neck(solved, filmed)
+    else:
+        returned = other_uvs.returned(solved, filmed, state.lights, start.exposure, start.tone)
+        delivered = maps.place_neck(returned, filmed)
     maps.write_maps(capture, delivered, _solution(state, evidence, start, solved.gain), conditions)
+    maps.write_skin_weight(capture, delivered.diffuse, tone, filmed)
     iris.measure_irises(capture, head, delivered.diffuse, report)
     comparison.write_comparison(capture, filmed, delivered.diffuse)
-    maps.write_preview(capture, state, start.observations, report)
+    maps.write_preview(capture, state, start.observations, start.tint, report)
     _report_maps(capture, evidence, solved, report)
     stored.unlink(missing_ok=True)
 
@@ -96,14 +102,19 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 def recipe_of(settings: Settings, prior: Prior) -> Recipe:
     """Return the chosen recipe at the prior's noise levels; ours has its steps and guidance from the settings."""
     recipe = RECIPES[settings.solve.recipe]
-    if prior.one_scale:
-        recipe = replace(recipe, coarse=())
+    if prior.one_scale:  # nor does it take a tone: its skins are of their own
+        recipe = replace(recipe, coarse=(), working_tone=None)
     if prior.sigmas is not None:
         recipe = replace(recipe, sigma_min=prior.sigmas[0], sigma_max=prior.sigmas[1])
     if settings.solve.recipe != "wildcap":
         return recipe
     faint = 0.0 if settings.delight.delighter == "none" else FAINT_WEIGHT
     return replace(recipe, steps=settings.solve.steps, guidance=settings.solve.guidance, faint=faint)
+
+
+def even_light(recipe: Recipe) -> Recipe:
+    """Return the recipe for a texture whose light was known and is gone: none is fitted."""
+    return replace(recipe, fitted=False, phases=(), refit=0.0, linear=0.0)
 
 
 def _map_size(settings: Settings, prior: Prior) -> int:
@@ -173,7 +184,7 @@ def _sample(
         losses.append((state.step, rms_residual(state, observations)))
         if state.step % settings.solve.checkpoint_every == 0:
             checkpoint.write_state(stored, state, key)
-            maps.write_preview(capture, state, observations, report)
+            maps.write_preview(capture, state, observations, start.tint, report)
             images.write_srgb(capture.preview / "loss.png", drawing.draw_loss_curve(losses, steps))
             report.preview("preview/loss.png")
 
@@ -188,7 +199,7 @@ def _run_key(evidence: Evidence, settings: Settings, start: Start) -> str:
     """Return a hash of everything that a run's bytes depend on."""
     digest, o = hashlib.blake2b(digest_size=16), start.observations[1]
     tensors = [evidence.texture, evidence.weight, evidence.alpha, evidence.normal]
-    tensors += [start.tone, start.state.lights.glob, start.local, start.reference, start.alpha]
+    tensors += [start.working_tone, start.state.lights.glob, start.local, start.reference, start.alpha]
     for values in (*tensors, o.texture, o.trust, o.restraint, o.missing):
         digest.update(torch.as_tensor(values).numpy().tobytes())
     digest.update(repr(start.recipe).encode())

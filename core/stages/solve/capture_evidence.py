@@ -69,6 +69,7 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
         "edge": np.zeros_like(alpha),
         "filmed": _brightness(capture, texture, skin * weight > 0.5),
         "added": added,
+        "hair": bearded,
     }
     tensors = {name: torch.from_numpy(np.ascontiguousarray(values, np.float32)) for name, values in maps.items()}
     return Evidence(covered=torch.from_numpy(covered), **tensors)

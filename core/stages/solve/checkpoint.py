@@ -26,10 +26,9 @@ from ...solver.solution import Solution
 
 def write_solution(path: Path, solution: Solution, conditions: dict[str, str]) -> None:
     """Store a solution, which is of use only under the same `conditions`, mask_edit's."""
-    names = "denoised", "painted", "alpha", "gain", "local", "tone"
+    names = "denoised", "painted", "alpha", "gain", "exposure", "local", "tone"
     tensors = {name: getattr(solution, name) for name in names} | vars(solution.lights)
     tensors["settled"] = torch.tensor(solution.settled)
-    tensors["exposure"] = torch.tensor(solution.exposure, dtype=torch.float64)
     _save(path, tensors, {FIELD: json.dumps(conditions)})
 
 
@@ -40,8 +39,7 @@ def read_solution(path: Path, conditions: dict[str, str]) -> Solution | None:
         if json.loads(metadata.get(FIELD, "null")) != conditions:
             return None
         lights = Lights(*(tensors.pop(name) for name in ("glob", "grid", "chroma")))
-        exposure, settled = tensors.pop("exposure").item(), bool(tensors.pop("settled"))
-        return Solution(lights=lights, exposure=exposure, settled=settled, **tensors)
+        return Solution(lights=lights, settled=bool(tensors.pop("settled")), **tensors)
     except (OSError, SafetensorError, KeyError, TypeError, ValueError):
         return None
 

@@ -9,9 +9,8 @@ import numpy as np
 from ...capture.capture import Capture
 from ...capture.files import replacing_folder
 from ...imaging import images
+from ...settings.colour_values import LUMINANCE_WEIGHTS
 from ...solver.evidence import Evidence
-
-LUMINANCE_WEIGHTS = np.float32([0.2126, 0.7152, 0.0722])  # of linear sRGB (Rec. 709)
 
 
 def write_comparison(capture: Capture, evidence: Evidence, albedo: np.ndarray) -> None:

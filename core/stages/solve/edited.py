@@ -47,16 +47,18 @@ def solve_edited(
     start = start_again(prior, evidence, earlier, cell, recipe, near, callbacks)
     solution = earlier
     if window is not None:
-        denoiser, seed = prior.of_tone(earlier.tone), settings.seed
+        denoiser, seed = prior.of_tone(start.working_tone), settings.seed
         denoised, lights = solve_inside(denoiser, start.observations, earlier, window, start.recipe, seed, report)
         solution = replace(earlier, denoised=denoised, lights=lights, painted=evidence.alpha, alpha=start.alpha)
     state = State(0, None, solution.denoised, solution.lights)
-    solved = maps.finish_maps(state, evidence, start, solution.gain)
+    solved = maps.place_neck(maps.finish_maps(state, evidence, start, solution.gain), evidence)
+    tone = SkinTone.from_linear(earlier.tone, EARLIER)
     if window is None:
         report.log("The mask is the last solve's: nothing was solved again.")
     else:
         maps.write_maps(capture, solved, solution, conditions, window.inside)
-        maps.write_preview(capture, state, start.observations, report)
+        maps.write_skin_weight(capture, solved.diffuse, tone, evidence)
+        maps.write_preview(capture, state, start.observations, start.tint, report)
         height, width = (s.stop - s.start for s in window.inside)
         report.log(f"{width} x {height} texels were solved again in {time.monotonic() - began:.1f} s.")
-    return solved, SkinTone.from_linear(earlier.tone, EARLIER)
+    return solved, tone

@@ -75,7 +75,7 @@ class Layout:
             changes |= {"skin": tone, "weight": weight * face, "alpha": changes["alpha"] * shadow}
         return replace(e, **changes)
 
-    def returned(self, solved: Maps, e: Evidence, lights: Lights, exposure: float, tone: torch.Tensor) -> Maps:
+    def returned(self, solved: Maps, e: Evidence, lights: Lights, exposure: torch.Tensor, tone: torch.Tensor) -> Maps:
         """Return the window's maps in the built-in UVs, in which the evidence is.
 
         Beyond the window the albedo is the texture under the solved global light, or our mean face of that linear tone
@@ -85,7 +85,7 @@ class Layout:
         side = 2 * (torch.arange(e.size) + 0.5) / e.size - 1
         mean = mean_at(self.face, torch.stack(torch.meshgrid(side, side, indexing="xy"))[None], tone[None])[0]
         light = shade(lights.glob, shading_basis(e.normal)).clamp_min(1e-2)
-        light = light / exposure / solved.gain[:, None, None]
+        light = light / (exposure * solved.gain)[:, None, None]
         albedo = torch.lerp((mean[:3] + 1) / 2, e.texture / light, e.weight.sqrt()).clamp(MIN_ALBEDO, 1)
 
         def join(baked: np.ndarray, beyond: np.ndarray) -> np.ndarray:

@@ -1,129 +1,189 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Summarise a person's skin in the frames by two colours: the best lit skin, and skin that faces as the face does.
+"""Look of a person in pictures: the colour of the facial skin, and what it is over that of the whites of the eyes.
 
-Over a capture's views each point of the head gets one colour, a low quantile of what the views show: highlights move
-with the camera, the skin's own colour does not. Lips, brows, beard, shadow and burnt-out pixels do not count.
+Skin and whites share one light, so the ratio has neither exposure nor the light's colour in it (Choi and Suk, "The
+human sclera and pupil as the calibration targets", 2017). Skin is read where a face's landmarks face the front, as the
+eyes do, and a card that is held before them. An eye's white is held against the skin around that eye alone, where a
+hard light is most alike and skin shines least. Of a white the brightest part counts, which the lids shade least; where
+that is burnt out, a darker one. No head and no camera is needed.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
 
 from ...capture.capture import Capture
+from ...capture.frame_records import FrameRecord, read_frames
 from ...capture.messages import Reporter
-from ...face import template
-from ...face.head import Head
+from ...face import eye_reader, faces, parser
+from ...face.landmark_model import template_landmarks
+from ...face.parts import cut
 from ...geometry import raster
-from ...geometry.meshes import vertex_uvs
-from ...geometry.views import View, read_views
 from ...imaging import images
-from ...light.spherical_harmonics import sh_basis
-from .witnesses import find_visible
+from ...settings import colour_values
 
-FRONT = np.array([0.0, -1.0, 0.0])  # unit normal of what faces the camera, in the head's axes
-VIEW_QUANTILE = 0.3  # over the views: below the median, as every highlight brightens and nothing but shadow darkens
-# quantiles of luminance between which skin is best lit; what is above is highlights that stood still
-BEST_LIT_QUANTILES = 0.75, 0.95
 BURNT_SRGB = 0.98  # sRGB from which a channel has lost its value
-MIN_SKIN_POINTS = 60  # points of skin
-SMOOTHING_SHARE = 0.003  # of the frame's longer side: what noise and a head that is off by a pixel amount to
-LIKE_RATIOS = 0.75, 1.35  # brightness over that of evenly lit skin, beyond which a point is shadow, mark or highlight
-LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB (IEC 61966-2-1)
-# per point, on the harmonics' coefficients: 1e-6, 0.01 and 0.1 on those of 1, of x, y, z and of xy, yz, z^2 - 1/3, xz,
-# x^2 - y^2
-SH_RIDGE = np.array([1e-6, *[0.03] * 3, 1.5, 1.5, 1.125, 1.5, 0.375]) / (4 * np.pi)
-BEARD_TOP_V = 0.42  # v of the texture below which a beard may grow, whose colour is not the skin's
+LUMINANCE_WEIGHTS = np.array(colour_values.LUMINANCE_WEIGHTS)
+FRONT_COSINE = 0.9  # between the front and the built-in head's normal at a landmark, from which it faces the front
+SKIN_QUANTILES = 0.1, 0.9  # of luminance, between which skin is averaged
+WHITE_BANDS = ((0.85, 0.99), 0.0), ((0.6, 0.85), 0.14), ((0.35, 0.6), 0.32), ((0.1, 0.35), 0.54)
+"""Quantiles of an eye's white, from the brightest part down, and the natural log by which each is darker than the
+first: the mean over the simulated people of `research.training tones`. What is above the first is catchlights."""
+BURNT_SHARE = 0.1  # of such a part, from which it is not read
+SMOOTHING_SHARE = 0.01  # deviation over the face's width of the blur at a landmark: pores and noise do not count
+SURE_SHARE = 0.9  # of a pixel, from which it counts as skin or as an eye's white
+ONE_EYE_LOG = 0.23  # natural log by which two eyes are taken to differ where one is seen: the mean over those people
+MIN_EYE_PX = 24  # distance between an eye's corners below which lashes and lids cover its white
+AROUND_EYE_WIDTHS = 1.2  # reach from an eye's middle of the skin that is held against its white
+MIN_LANDMARKS, MIN_AROUND, MIN_PIXELS = 10, 8, 40  # of skin, of skin around an eye, and of white
+MAX_YAW_DEG = 35.0  # of a frame whose eyes are looked at
+MAX_PICTURES = 8
+
+
+@dataclass(frozen=True)
+class Eyes:
+    """Skin around open eyes over their whites.
+
+    over_white: `to_coordinates` of the skin less those of the whites [3]; unevenness: of the light there, the range of
+    the skin's log luminance around an eye, and by how much the two eyes differ; burnt: if the whites are burnt out, and
+    therefore brighter than was read.
+    """
+
+    over_white: np.ndarray
+    unevenness: float
+    burnt: bool = False
 
 
 @dataclass(frozen=True)
 class Look:
-    """Linear colours [3] of skin as the camera shows them: in the best light, and facing -Y, the way the face looks."""
+    """Look of a person.
 
-    best: np.ndarray
-    front: np.ndarray
-
-
-def summarise_look(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray) -> Look:
-    """Return the look of skin points: linear colours [N, 3], unit normals [N, 3] in the head's axes, weights [N]."""
-    return Look(mean_best_lit(colours, weight), _facing_front(colours, normals, weight))
-
-
-def mean_best_lit(colours: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return the mean [3] of the best lit of linear colours [N, 3] under weights [N], highlights left out."""
-    order = np.argsort(colours @ LUMINANCE_WEIGHTS)
-    rank = np.cumsum(weight[order]) / weight.sum()
-    best = order[(rank >= BEST_LIT_QUANTILES[0]) & (rank <= BEST_LIT_QUANTILES[1])]
-    return np.average(colours[best], axis=0, weights=weight[best] + 1e-9)
-
-
-def read_look(capture: Capture, head: Head, shadow: np.ndarray, report: Reporter) -> Look | None:
-    """Return the look of the selected frames, as they were filmed; None without frames, cameras or enough skin.
-
-    shadow [S, S] is the soft mask in the head's UVs.
+    skin: its `to_coordinates` [3]; unevenness: of the light, the range of the skin's log luminance; eyes: None without
+    open ones.
     """
-    if not capture.frames_json.is_file() or not capture.cameras.is_dir():
+
+    skin: np.ndarray
+    unevenness: float = 0.0
+    eyes: Eyes | None = None
+
+
+def to_coordinates(linear: np.ndarray) -> np.ndarray:
+    """Return ln luminance, ln R/G, ln B/G [..., 3] of linear colours [..., 3]."""
+    log = np.log(np.maximum(linear, 1e-4))
+    luminance = np.log(np.maximum(linear @ LUMINANCE_WEIGHTS, 1e-4))
+    return np.stack([luminance, log[..., 0] - log[..., 1], log[..., 2] - log[..., 1]], -1)
+
+
+def mean_between(colours: np.ndarray, quantiles: tuple[float, float]) -> np.ndarray:
+    """Return the mean [C] of linear colours [N, C], with further channels, of luminance between two quantiles."""
+    luminance = colours[:, :3] @ LUMINANCE_WEIGHTS
+    low, high = np.quantile(luminance, quantiles)
+    return colours[(luminance >= low) & (luminance <= high)].mean(0)
+
+
+def read_look(capture: Capture, report: Reporter) -> Look | None:
+    """Return the look in the frames as they were filmed, the median over those from in front; None without any."""
+    looks = []
+    records = _frontal(read_frames(capture).records) if capture.frames_json.is_file() else []
+    for i, record in enumerate(records):
+        report.progress(i, len(records), f"looking at the skin in frame {i + 1} of {len(records)}")
+        path = capture.frames / record.name
+        if path.is_file():
+            looks.append(look_at(images.read_srgb(path)))
+    return merge_looks(looks)
+
+
+def merge_looks(looks: list[Look | None]) -> Look | None:
+    """Return the median of the looks that pictures show, None without any. Burnt whites count where all are burnt."""
+    looks = [look for look in looks if look is not None]
+    if not looks:
         return None
-    views = [view for view in read_views(capture, selected_only=True) if view.path.is_file()]
-    if not views:
+    eyes = [look.eyes for look in looks if look.eyes is not None]
+    eyes = [each for each in eyes if not each.burnt] or eyes
+    return Look(
+        np.median([look.skin for look in looks], 0),
+        float(np.median([look.unevenness for look in looks])),
+        Eyes(
+            np.median([each.over_white for each in eyes], 0),
+            float(np.median([each.unevenness for each in eyes])),
+            eyes[0].burnt,
+        )
+        if eyes
+        else None,
+    )
+
+
+def _frontal(records: tuple[FrameRecord, ...]) -> list[FrameRecord]:
+    """Return up to MAX_PICTURES frames that show the face from in front with open eyes, else from where they do."""
+    shown = [record for record in records if record.face_box]
+    frontal = [r for r in shown if abs(r.yaw_deg) <= MAX_YAW_DEG and not r.blink] or shown
+    frontal.sort(key=lambda record: abs(record.yaw_deg))
+    return frontal[:: max(1, len(frontal) // MAX_PICTURES)][:MAX_PICTURES]
+
+
+def look_at(srgb: np.ndarray) -> Look | None:
+    """Return the look of the person in an sRGB picture [H, W, 3]; None without a face or with too little skin."""
+    face = faces.detect(srgb)
+    if face is None:
         return None
-    mesh, normals = head.mesh, head.normals
-    weight = raster.sample_uv(weigh_skin(512, shadow), vertex_uvs(mesh))
-    points = np.flatnonzero(weight > 0.05)
-    colours = np.full((len(views), len(points), 3), np.nan)
-    for i, view in enumerate(views):
-        report.progress(0, len(views), f"looking at the skin in frame {i + 1} of {len(views)}")
-        colours[i] = _read_colours(view, head.caster, mesh.vertices[points], normals[points])
-    often = np.isfinite(colours[..., 0]).sum(0) >= min(2, len(views))
-    if often.sum() < MIN_SKIN_POINTS:
+    linear = images.srgb_to_linear(srgb).astype(np.float32)
+    whole = (srgb.max(-1) < BURNT_SRGB).astype(np.float32)
+    bare = parser.parse(srgb, face.landmarks).of("skin") * whole
+    marks = face.landmarks[_front_landmarks(), :2]
+    marks = marks[raster.sample(bare, marks) > SURE_SHARE]
+    colours = raster.sample(cv2.GaussianBlur(linear, (0, 0), SMOOTHING_SHARE * face.width), marks)
+    above = marks[:, 1] < face.landmarks[faces.NOSE, 1]  # below, a beard's colour is not the skin's
+    if above.sum() < MIN_LANDMARKS:
         return None
-    points = points[often]
-    return summarise_look(_low_quantile(colours[:, often]), normals[points], weight[points])
+    skin, unevenness = _read_skin(colours[above])
+    readings = []
+    for outer, inner, left in ((*faces.RIGHT_EYE, False), (*faces.LEFT_EYE[::-1], True)):
+        corners = face.landmarks[[outer, inner], :2]
+        width = np.linalg.norm(corners[1] - corners[0])
+        white = _read_white(srgb, linear, corners, left) if width >= MIN_EYE_PX else None
+        if white is not None:
+            near = np.linalg.norm(marks - corners.mean(0), axis=1) < AROUND_EYE_WIDTHS * width
+            around, range_ = _read_skin(colours[near]) if near.sum() >= MIN_AROUND else (skin, unevenness)
+            readings.append(Eyes(around - white[0], range_, white[1]))
+    return Look(skin, unevenness, _merge_eyes(readings) if readings else None)
 
 
-def weigh_skin(size: int, shadow: np.ndarray) -> np.ndarray:
-    """Return weights [size, size] of plain facial skin out of the `shadow` [S, S] and out of a beard's reach."""
-    skin = template.mask("skin", size) * template.mask("face", size)
-    for name in ("lips", "brows", "eyes", "nostrils"):
-        skin = skin * (1 - template.mask(name, size))
-    skin[round(size * (1 - BEARD_TOP_V)) :] = 0
-    shadow = cv2.dilate(images.resize(shadow.astype(np.float32), size, size), np.ones((3, 3)))
-    return skin * np.clip(1 - 3 * shadow, 0, 1)  # half a shadow darkens skin, too
+def _read_skin(colours: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the coordinates [3] of skin that shows linear colours [N, 3], and the range of its log luminance."""
+    low, high = np.quantile(to_coordinates(colours)[:, 0], SKIN_QUANTILES)
+    return to_coordinates(mean_between(colours, SKIN_QUANTILES)), float(high - low)
 
 
-def _facing_front(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return the colour [3] of skin whose normal is FRONT, by second-order spherical harmonics fitted to the skin."""
-    weight = weight * np.clip(normals @ FRONT, 0, None)
-    basis, front = sh_basis(normals), sh_basis(FRONT)
-    inliers = np.ones(len(colours))
-    for _ in range(5):
-        weighted = basis * (weight * inliers)[:, None]
-        ridge = np.diag(SH_RIDGE) * (weight * inliers).sum()
-        light = np.linalg.solve(basis.T @ weighted + ridge, weighted.T @ colours)
-        ratio = (colours @ LUMINANCE_WEIGHTS) / np.maximum(basis @ light @ LUMINANCE_WEIGHTS, 1e-6)
-        inliers = ((ratio > LIKE_RATIOS[0]) & (ratio < LIKE_RATIOS[1])).astype(float)
-        if (weight * inliers).sum() < 0.1 * weight.sum():
-            break
-    return np.maximum(front @ light, 1e-4)
+def _read_white(
+    srgb: np.ndarray, linear: np.ndarray, corners: np.ndarray, left: bool
+) -> tuple[np.ndarray, bool] | None:
+    """Return the coordinates [3] of an eye's white, and if all of it is burnt out; None if too little is seen."""
+    eye = eye_reader.read_eye(srgb, corners, left)
+    colours = cut(linear, eye.move, len(eye.ball))[eye.ball * (1 - eye.iris) > SURE_SHARE]
+    if len(colours) < MIN_PIXELS:
+        return None
+    whole = (colours.max(-1) < images.srgb_to_linear(BURNT_SRGB)).astype(np.float32)
+    parts = [mean_between(np.column_stack([colours, whole]), quantiles) for quantiles, _ in WHITE_BANDS]
+    unburnt = [k for k, part in enumerate(parts) if part[3] > 1 - BURNT_SHARE]
+    chosen = unburnt[0] if unburnt else len(parts) - 1
+    return to_coordinates(parts[chosen][:3]) + [WHITE_BANDS[chosen][1], 0, 0], not unburnt
 
 
-def _read_colours(view: View, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Return linear colours [N, 3] of surface points in a view's frame, nan if hidden or burnt out."""
-    colours, frame = np.full((len(points), 3), np.nan), view.read()
-    facing = np.flatnonzero(find_visible(view, caster, points, normals))
-    if len(facing):
-        pixels, _ = view.project(points[facing])
-        smooth = cv2.GaussianBlur(images.srgb_to_linear(frame), (0, 0), SMOOTHING_SHARE * max(frame.shape[:2]))
-        whole = raster.sample(frame.max(-1), pixels) < BURNT_SRGB
-        colours[facing[whole]] = raster.sample(smooth, pixels[whole])
-    return colours
+def _merge_eyes(readings: list[Eyes]) -> Eyes:
+    """Return the mean of both eyes, or of the one whose white is not burnt out."""
+    readings = [each for each in readings if not each.burnt] or readings
+    over = np.array([each.over_white for each in readings])
+    apart = np.ptp(over[:, 0]) if len(over) == 2 else ONE_EYE_LOG
+    unevenness = np.mean([each.unevenness for each in readings]) + apart
+    return Eyes(over.mean(0), float(unevenness), readings[0].burnt)
 
 
-def _low_quantile(colours: np.ndarray) -> np.ndarray:
-    """Return the VIEW_QUANTILE [N, 3] over the views of [V, N, 3], of which each point has a value that is not nan."""
-    count = np.isfinite(colours[..., 0]).sum(0)
-    at = np.floor(VIEW_QUANTILE * (count - 1)).astype(int)
-    return np.take_along_axis(np.sort(colours, 0), at[None, :, None], 0)[0]  # sort puts nan last
+@cache
+def _front_landmarks() -> np.ndarray:
+    """Return the landmarks [N] that face the way that the face looks."""
+    return np.flatnonzero(template_landmarks().normals @ [0, -1, 0] > FRONT_COSINE)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -13,6 +13,7 @@ import torch
 from ...capture.capture import Capture
 from ...capture.files import replacing_folder
 from ...capture.messages import Reporter
+from ...face import neck, skin_weight
 from ...imaging import images
 from ...solver.evidence import Evidence
 from ...solver.extensions.marks import draw_cover
@@ -22,8 +23,9 @@ from ...solver.solution import Solution
 from ...solver.start import Start, mean_tone
 from .checkpoint import write_solution
 from .confidence import estimate_confidence
+from .skin_tone import SkinTone
 
-MIN_ALBEDO = 0.004  # linear albedo below which no skin or hair lies
+MIN_ALBEDO = 0.004  # linear albedo below which no skin or hair lies, of skin in the working tone
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,7 @@ class Maps:
     """Maps [S, S(, 3)], float32.
 
     diffuse and shading: linear, diffuse * shading = I_UV; normal: packed into [0, 1], tangent space, OpenGL Y+;
-    specular and confidence: in [0, 1]; gain [3]: factor that brought the albedo to the skin tone.
+    specular and confidence: in [0, 1]; gain [3]: factor that brought the albedo, in the working tone, to the skin tone.
     """
 
     diffuse: np.ndarray
@@ -45,16 +47,16 @@ class Maps:
 def finish_maps(state: State, evidence: Evidence, start: Start, gain: torch.Tensor | None = None) -> Maps:
     r"""Read the maps out of \hat x_0.
 
-    The albedo is rescaled once so that the mean of the confident facial skin is the skin tone, or by `gain` [3] if that
-    was found before; the shading takes the inverse, so that their product stays. Unseen texels are the mean face of
-    that tone: a drawn sample would be as likely, but would look like a measurement. So is the specular albedo, which no
-    term of the likelihood constrains.
+    The albedo leaves the working tone by one gain, after which the mean of the confident facial skin is the skin tone,
+    or by `gain` [3] if that was found before; the shading takes the inverse, so that their product stays. Unseen texels
+    are the mean face of that tone: a drawn sample would be as likely, but would look like a measurement. So is the
+    specular albedo, which no term of the likelihood constrains.
     """
     shader = start.observations[1].shader
     share = evidence.weight.sqrt()
     x = torch.lerp(start.reference, state.denoised, share)[0]
     with torch.no_grad():
-        beside = enlarge_field(start.local, evidence.size).exp() / start.exposure
+        beside = enlarge_field(start.local, evidence.size).exp() / start.exposure[:, None, None]
         shading = shader.total(state.lights).clamp_min(1e-3) * beside
     diffuse = albedo(x[None])
     if start.marks:  # they are the skin's, however unlikely under the prior
@@ -62,19 +64,27 @@ def finish_maps(state: State, evidence: Evidence, start: Start, gain: torch.Tens
         diffuse = torch.lerp(diffuse, evidence.texture / shading, cover)
     diffuse = diffuse.clamp_min(MIN_ALBEDO)
     if gain is None:
-        gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone, start.recipe.rescale)
+        gain = start.tint * _gain(diffuse, evidence.skin * evidence.weight, start.working_tone, start.recipe.rescale)
     normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
     specular = ((start.reference[0, 6] + 1) / 2).clamp(0, 1).numpy()
-    gains = torch.lerp(torch.ones(3, 1, 1), gain[:, None, None], share)  # the mean face is of the tone already
-    delivered = to_picture((diffuse * gains).clamp(MIN_ALBEDO, 1))
+    gains = torch.lerp(
+        start.tint[:, None, None], gain[:, None, None], share
+    )  # the mean face has the working tone exactly
     return Maps(
-        delivered,
+        to_picture((diffuse * gains).clamp_max(1)),
         specular,
         to_picture(normal),
         to_picture(shading / gains),
-        estimate_confidence(evidence, delivered),
+        estimate_confidence(evidence, to_picture(diffuse)),
         gain,
     )
+
+
+def place_neck(maps: Maps, evidence: Evidence) -> Maps:
+    """Give the unseen neck of maps in the built-in UVs its measured colour beside this face; seen texels stay."""
+    unseen = 1 - evidence.weight.sqrt().numpy()
+    gain = neck.neck_gain(maps.diffuse, skin_weight.mean_skin(maps.diffuse), unseen)
+    return replace(maps, diffuse=np.minimum(maps.diffuse * gain, 1), shading=maps.shading / gain)
 
 
 def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, rescale: str) -> torch.Tensor:
@@ -114,13 +124,24 @@ def write_maps(
         write_solution(folder / capture.solved.name, solution, conditions)
 
 
-def write_preview(capture: Capture, state: State, observations: dict[int, Observation], report: Reporter) -> None:
-    """Write preview/albedo.png and shading.png of a running solve, at the size that it works at just now."""
+def write_skin_weight(capture: Capture, albedo: np.ndarray, tone: SkinTone, filmed: Evidence) -> None:
+    """Write maps/skin_weight.png, by the solved albedo [S, S, 3] and the evidence in the built-in UVs."""
+    weight = skin_weight.weigh_skin(albedo, np.array(tone.linear, np.float32), filmed.hair.numpy())
+    images.write_data(capture.skin_weight, weight)
+
+
+def write_preview(
+    capture: Capture, state: State, observations: dict[int, Observation], tint: torch.Tensor, report: Reporter
+) -> None:
+    """Write preview/albedo.png and shading.png of a running solve, at the size that it works at just now.
+
+    `tint` [3] brings the albedo to the skin tone.
+    """
     o = observation_of(state, observations)
     with torch.no_grad():
         shading = o.shader.total(state.lights).clamp_min(0).cpu()
     scale = 0.6 / max(float(np.percentile(shading.numpy(), 95)), 1e-6)
-    for name, image in (("albedo", albedo(state.denoised).cpu()), ("shading", scale * shading)):
+    for name, image in (("albedo", albedo(state.denoised).cpu() * tint[:, None, None]), ("shading", scale * shading)):
         images.write_srgb(capture.preview / f"{name}.png", images.linear_to_srgb(to_picture(image)))
         report.preview(f"preview/{name}.png")
 

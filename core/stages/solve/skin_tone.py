@@ -13,9 +13,11 @@ import torch
 from ...imaging import images
 from ...settings import colour_values
 
-# sources of a tone: the settings; an estimate from the frames as they were filmed, or with a measured white; one from
-# the texture; the solve before
-GIVEN, SCENE, WHITE_POINT, TEXTURE, EARLIER = "given", "scene", "white point", "texture", "earlier solve"
+# sources of a tone: the settings; an estimate from the frames as they were filmed, by the whites of the eyes, or with a
+# measured white; one from frames without colour, or of colours that no skin has; one from the texture; the solve before
+GIVEN, SCENE, EYES, WHITE_POINT = "given", "scene", "whites of the eyes", "white point"
+COLOURLESS, STRANGE = "no colour", "strange colours"
+TEXTURE, EARLIER = "texture", "earlier solve"
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class SkinTone:
 
     linear: linear sRGB [3] in (0, 1], numbers of float32. Of an estimate from the frames, else None: deviation, one
     standard deviation of the lightness L*; error, the expected colour difference, delta E 2000; group, the name of such
-    tones (population.TYPOLOGY_GROUPS).
+    tones (population.TYPOLOGY_GROUPS). Of a tone that was given: estimate, what the pictures tell, if they do.
     """
 
     linear: tuple[float, float, float]
@@ -32,6 +34,7 @@ class SkinTone:
     deviation: float | None = None
     error: float | None = None
     group: str | None = None
+    estimate: SkinTone | None = None
 
     @classmethod
     def from_linear(cls, linear: np.ndarray | torch.Tensor, source: str, **other_fields) -> SkinTone:
@@ -57,6 +60,9 @@ class SkinTone:
 
 
 def read_given_tone(setting: str) -> SkinTone | None:
-    """Return the tone of settings.solve.skin_tone, None for auto. Raises Problem if it is not a colour."""
+    """Return the tone of settings.solve.skin_tone, None for auto and for a swatch, whose hue is the person's.
+
+    Raises Problem if it is none of these.
+    """
     srgb = colour_values.parse_skin_tone(setting)
-    return None if srgb is None else SkinTone.from_srgb(srgb, GIVEN)
+    return SkinTone.from_srgb(srgb, GIVEN) if isinstance(srgb, tuple) else None

@@ -3,13 +3,15 @@
 """Stage upscale: maps/ becomes maps_4k/, the same names at settings.upscale.size, with the head completed.
 
 Masks of hair, the skin below it, and single hairs come with them. Albedo, normals and specular are enlarged by a
-network, or by Lanczos resampling, which adds no detail; light and confidence by resampling.
+network, or by Lanczos resampling, which adds no detail; light and confidence by resampling. The network takes every
+skin in the solver's working tone, so that the detail it adds does not hang on the tone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,13 +21,15 @@ from ...capture.messages import Reporter
 from ...capture.stages import STRANDS
 from ...face.head import read_head
 from ...face.shown_parts import read_parts
+from ...face.skin_weight import mean_skin
 from ...face.strands import Strands
 from ...imaging import images
 from ...settings.settings import Settings
+from ...solver.recipes import OURS
 from . import detail, drawing, gloss, grooming, hair
 from .maps import HeadMaps, read_maps
 from .surface import lay_out
-from .whole_head import complete
+from .whole_head import DARKEST_LINEAR, complete
 
 # rows that are worked on at once: a whole 4096 map in float32 is 200 MB, and each operation on it would make another
 STRIP_ROWS = 256
@@ -47,7 +51,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     maps, hair_maps, hairs = _complete_head(capture, maps, settings, report)
     share, check = SHARES[method], report.check
     device = settings.compute_device
-    large = enlarged(maps, size, method, device, lambda done: report.progress(share * done, 1, "enlarging"))
+    gain = mean_skin(maps.diffuse).clip(DARKEST_LINEAR) / OURS.working_tone
+    large = enlarged(maps, size, method, device, lambda done: report.progress(share * done, 1, "enlarging"), gain)
     srgb, normal, specular = large[..., :3], large[..., 3:6], large[..., 6]
     with replacing_folder(capture.maps_4k) as folder:
         if guided:
@@ -120,19 +125,33 @@ def _complete_head(
     return maps, (masks, cleaned, share), hairs
 
 
-def enlarged(maps: HeadMaps, size: int, method: str, device: str, progress) -> np.ndarray:
+def enlarged(
+    maps: HeadMaps,
+    size: int,
+    method: str,
+    device: str,
+    progress: Callable[[float], None],
+    gain: np.ndarray | float = 1.0,
+) -> np.ndarray:
     """Return diffuse (sRGB), unit normal and specular at another size: float32 [size, size, 7].
 
-    The network makes four times as many texels of a side; more or fewer are resampled. `progress` gets the share done.
+    The network makes four times as many texels of a side; more or fewer are resampled. `progress` gets the share done;
+    gain, one number or [3], is the factor from the working tone to the albedo's.
     """
     if method == "network" and size > len(maps.diffuse):
         from .enlarge import enlarge  # torch is only needed here
 
-        large = enlarge(maps, progress, device)
+        large = enlarge(replace(maps, diffuse=maps.diffuse / np.float32(gain)), progress, device)
+        _map_strips(large[..., :3], lambda srgb: _times(srgb, gain))
         if len(large) == size:
             return large
         return _join(images.srgb_to_linear(large[..., :3]), large[..., 3:6], large[..., 6], size, progress)
     return _join(maps.diffuse, maps.normal, maps.specular, size, progress)
+
+
+def _times(srgb: np.ndarray, gain: np.ndarray | float) -> np.ndarray:
+    """Multiply the linear values of sRGB [H, W, 3] by a gain, one number or [3]."""
+    return images.linear_to_srgb(np.clip(images.srgb_to_linear(srgb) * np.float32(gain), 0, 1))
 
 
 def _join(diffuse: np.ndarray, normal: np.ndarray, specular: np.ndarray, size: int, progress) -> np.ndarray:

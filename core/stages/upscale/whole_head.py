@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Complete the whole head from the part that the cameras saw.
 
-Its tone differs from that of the mean face by a smooth field over the surface, its pores and mottling come from the
-solved skin's own statistics. Scalp goes on as scalp and skin as skin: if cropped hair was seen, unseen scalp takes its
-tone. What was seen well keeps its values.
+Its tone differs from that of the mean face, with the neck that people of this tone have, by a smooth field over the
+surface; its pores and mottling come from the solved skin's own statistics. Scalp goes on as scalp and skin as skin: if
+cropped hair was seen, unseen scalp takes its tone. What was seen well keeps its values.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from safetensors import safe_open
 from ...capture import shipped_files
 from ...capture.messages import Reporter
 from ...face import template
+from ...face.neck import neck_gain
+from ...face.skin_weight import mean_skin
 from ...geometry.noise import noise
 from . import grain
 from .maps import HeadMaps
@@ -140,7 +142,7 @@ def _features(size: int) -> np.ndarray:
 
 def _tone(channels: np.ndarray, trust: np.ndarray, surface: HeadSurface, seed: int) -> np.ndarray:
     """Return log albedo and specular [S, S, 4] without detail; a scalp that was hardly seen is bare skin."""
-    scalp, usual = template.mask("scalp", surface.size), usual_skin(surface.size)
+    scalp, usual = template.mask("scalp", surface.size), _usual_head(channels)
     bare = trust * (1 - _features(surface.size))
     bald = surface.smooth(usual, (1 - _features(surface.size)) * (1 - scalp) ** 4, REACH_MM)
     of_skin = bald + surface.smooth(channels - bald, bare * (1 - scalp), REACH_MM, ODD_LOG)
@@ -161,6 +163,13 @@ def usual_skin(size: int) -> np.ndarray:
         mean = file.get_tensor("mean_face").astype(np.float32).transpose(1, 2, 0)
     mean = cv2.resize(mean, (size, size), interpolation=cv2.INTER_LINEAR)
     return np.concatenate([np.log(np.maximum(mean[..., :3], 0.05)), (mean[..., 6:] + 1) / 2], 2)
+
+
+def _usual_head(channels: np.ndarray) -> np.ndarray:
+    """Return the usual skin over the skin tone [S, S, 4], its neck as measured beside faces of this tone."""
+    usual, tone = usual_skin(len(channels)), mean_skin(np.exp(channels[..., :3]))
+    gain = neck_gain(np.exp(usual[..., :3]) * tone, tone, np.ones_like(usual[..., 0]))
+    return np.concatenate([usual[..., :3] + np.log(gain), usual[..., 3:]], 2)
 
 
 def _low(channels: np.ndarray, observed: np.ndarray, surface: HeadSurface) -> np.ndarray:

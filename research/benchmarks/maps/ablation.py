@@ -208,7 +208,7 @@ def solve_problem(
         evidence = read_evidence(capture, read_head(capture), size)
     start = start_solve(prior, evidence, tone.tensor, FACE_CROP / cells, recipe, make_head_cells)
     if with_prior:
-        sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(seed))
+        sampler = Sampler(prior.of_tone(start.working_tone), start.recipe, seed_noise(seed))
         state = sampler.sample(start.observations, start.state)
     else:
         state = fit_texels(start, start.recipe)

@@ -150,7 +150,7 @@ def solve_by_method(
     if method == FREE:
         state = fit_texels(start, replace(recipe, decay=0.995), FREE_UPDATES, smooth=FREE_SMOOTH, **fit)
     else:
-        sampler = Sampler(prior.of_tone(start.tone), recipe, seed_noise(seed), **fit)
+        sampler = Sampler(prior.of_tone(start.working_tone), recipe, seed_noise(seed), **fit)
         state = sampler.sample(start.observations, start.state)
     result = maps.finish_maps(state, evidence, start)
     return result.diffuse, result.shading, time.monotonic() - began

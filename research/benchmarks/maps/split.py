@@ -23,20 +23,18 @@ import numpy as np
 import torch
 
 from core.capture.capture import Capture
-from core.capture.messages import Problem
 from core.face.head import read_filmed_head
 from core.imaging import images
 from core.solver.extensions import split
 from core.solver.objective import albedo
+from core.solver.recipes import OURS
 from core.solver.start import make_reference, make_shapes
 from core.stages.solve import confidence
 from core.stages.solve.capture_evidence import read_evidence
 from core.stages.solve.head_cells import make_head_cells
 from core.stages.solve.prior_files import load
-from core.stages.solve.skin_tone import read_given_tone
 
 from .. import figures
-from ..captures import people
 from ..captures.state_captures import DELIT, SIZE, SOLVED, Filmed, add_captures, captures_asked
 from ..delighting.state_scores import in_uv, of_person, small
 from ..measures.references import NOTHING, TRUE
@@ -157,12 +155,10 @@ prior = cache(load)
 
 
 def shapes_of(filmed: Filmed) -> split.Shapes:
-    """Return the input of the solver's split for a capture, with the true tone."""
+    """Return the input of the solver's split for a capture."""
     evidence = read_evidence(filmed.capture, read_filmed_head(filmed.capture), SIZE)
-    tone = read_given_tone(people.skin_tone(filmed.truth))
-    if tone is None:
-        raise Problem(f"{filmed.truth} has no skin tone.", "Give it a skin_tone.txt with sRGB R,G,B.")
-    return make_shapes(evidence, albedo(make_reference(prior(), tone.tensor, evidence, "mean")))
+    tone = torch.tensor(OURS.working_tone)
+    return make_shapes(evidence, albedo(make_reference(prior(), tone, evidence, "mean")))
 
 
 def divided(shapes: split.Shapes, fitted: split.Split, local: bool) -> np.ndarray:

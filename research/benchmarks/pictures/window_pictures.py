@@ -3,7 +3,7 @@
 """Cut the guide's pictures of the window out of the screenshots that the window flows leave in dist/gui.
 
     make demo zip
-    tests/gui/run.sh loop panels set_up
+    tests/gui/run.sh loop panels set_up skin_tone
     python -m research.benchmarks.pictures.window_pictures [--only NAME ...]     each NAME a docs/pictures/NAME.jpg
 
 They show the sample head and nothing else; of set_up, which installs the solver, the question and the installation. A
@@ -40,11 +40,13 @@ QUESTION, PANEL = (0.005, 0.38, 0.397, 0.66), (0.605, 0.1, 0.825, 0.38)
 """Dialog over the 3D view, and the tab with its neighbours' names."""
 HEAD = (0.285, 0.13, 0.54, 0.8)
 """Head in the 3D view, between its tools and the sidebar."""
+HEAD_AND_TAB = (0.28, 0.1, 0.81, 0.82)
 PICTURES = {
     "paint_on_head": WindowPicture(("4_stroke_on_head",), 1280),
     "paint_on_sheet": WindowPicture(("5_stroke_on_sheet",), 1280),
     "solve_running": WindowPicture(("6_solve_running",), 1280),
     "compare": WindowPicture(("compare_filmed", "compare_delit", "compare_solved"), 320, (HEAD,)),
+    "skin_tone": WindowPicture(("skin_tone_3_undone", "skin_tone_2_swatch_8"), 420, (HEAD_AND_TAB,)),
     "panels": WindowPicture(("panels",), 1076),
     "install": WindowPicture(("set_up_1_asked", "set_up_2_installing"), 640, (QUESTION, PANEL)),
     "walk_1": WindowPicture(("1_new",), 640),

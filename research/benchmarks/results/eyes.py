@@ -31,7 +31,8 @@ def sections(record: Figures) -> Sections:
         followed. *Filmed*: people whose head also comes from their film. Their rims are worst at the eyes' corners,
         where the opening is thinner than the reader resolves. Irises of true heads are measured over their true skin (a
         dash: not measured), those of filmed people over the solved skin; both eyes have one colour, so a person's two
-        figures are alike.
+        figures are alike. Since then irises are measured over the white as well, and no longer follow the skin's tone
+        ([at a wrong tone](wrong_tones.md)).
         """
     means = markdown(["mean over eyes", *COLUMNS[:7]], [[name, *_means(group)] for name, group in groups.items()])
     return [

@@ -26,7 +26,7 @@ RECORDS = (
     "comparison",
     "photographs",
     "whole_head",
-    "skin_tone",
+    "real_tones",
     "confidence",
 )
 GROUPS = {
@@ -43,6 +43,7 @@ GROUPS = {
         "ablation",
         "prior",
         "confidence",
+        "wrong_tones",
     ),
     "Before the solve": ("geometry", "eyes", "delighters", "photographs", "shadows", "skin_tone"),
     "After the solve": ("upscale", "whole_head", "hair", "even_light", "delivery"),
@@ -201,7 +202,7 @@ def losses(of: Figures) -> str:
     """Return what a reader should know before the tables."""
     answers, lamps = of.state.summary, of.photographs.lamps.summary
     against = paired({name: one for name, one in of.comparison.subjects.items() if name != "scan"})["delit"]
-    relit, people, tones = of.relit.sample, of.relit_people.mean, of.skin_tone.groups
+    relit, people, tones = of.relit.sample, of.relit_people.mean, of.real_tones.people
     known = of.confidence.summary[SHIPPED]
     scalp = of.whole_head.synthetic.scalp
     return prose(f"""
@@ -222,8 +223,9 @@ def losses(of: Figures) -> str:
         - **Brows and lips keep {answers.solved.kept_brows.mean:.2f} and {answers.solved.kept_lips.mean:.2f} of their
           contrast** ([state](state.md#features-kept)); edges of hard shadows leave a faint outline, the paper's own
           failure case.
-        - **Dark skin comes out {tones.dark.scene.lightness:.0f} L* too light, very light skin
-          {-tones["very light"].scene.lightness:.0f} too dark** by frames alone ([skin tone](skin_tone.md)).
+        - **In hard light dark skin comes out {tones.relit.eyes.black.bias:.0f} L* too light**, in even light
+          {tones.exposed.eyes.black.bias:.0f}; where no open eyes are seen, the tone is hardly known
+          ([skin tone](skin_tone.md)).
         - **The confidence map knows little**: {known.gained.mean:.2f} nats more than one sigma for all, aim 0.1
           ([page](confidence.md)).
         - **A scalp that nobody saw becomes bare skin** ({scalp.completed:.0f} of 255 off where hair was;

@@ -8,6 +8,7 @@ colours are varied far beyond the plausible.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -22,7 +23,7 @@ from ..portrait import Portrait, draw_lamps, with_lips
 from ..response import curve, develop, expose
 from .clutter import cover_person, open_mouth, paint_backdrop
 from .markings import moles, stains, tufts
-from .relightable import RelightableView
+from .relightable import FRONT, RelightableView
 from .snapshot import GLOSS, LIPS, SKIN, directions, normalised_shares, recoloured, shade_highlight, weave
 
 STRONGEST = 25.0
@@ -85,9 +86,15 @@ def colours_of(stage: RelightableView, rng: np.random.Generator) -> Colours:
 
 
 def portray(
-    stage: RelightableView, colours: Colours, rng: np.random.Generator, panoramas: list[np.ndarray] = ()
+    stage: RelightableView,
+    colours: Colours,
+    rng: np.random.Generator,
+    panoramas: list[np.ndarray] = (),
+    meter: Callable[[np.ndarray, np.ndarray, np.random.Generator], tuple[np.ndarray, np.ndarray]] = expose,
 ) -> Portrait:
     """Photograph a person under a random light, which panoramas, from `read_panoramas`, may be.
+
+    meter: takes the place of `expose`.
 
     Where hair grows, and on the eyes, `even` is that of the bare head; `fitted` is that of all pixels, row by row, and
     0 off the bare head.
@@ -107,7 +114,7 @@ def portray(
     radiance = (albedo * diffuse + shine) * (1 - behind) + ground * behind
     radiance, shares = cover_person(radiance, shares, sight.landmarks, light, rng)
     face = shares[..., SKIN] > 0.5
-    linear, gains = expose(radiance, face if face.sum() > 50 else shares[..., -1] < 0.5, rng)
+    linear, gains = meter(radiance, face if face.sum() > 50 else shares[..., -1] < 0.5, rng)
     tone = (albedo[face] if face.sum() > 50 else albedo[visible] if visible.any() else albedo.reshape(-1, 3)).mean(0)
     grown = 1 - shares[..., [PARTS.index(name) for name in (*BARE, "background")]].sum(-1)
     grown = (np.clip(grown, 0, 1) * stage.here)[..., None]
@@ -115,6 +122,7 @@ def portray(
     # too, and that is to stay in the albedo. Gloss counts for more of what is darker.
     plain = with_lips(tone, albedo, shares[..., LIPS])
     even = plain * ((1 - grown) * diffuse + grown * own) + (1 - grown) * shine + grown * own_shine
+    card = irradiance(FRONT, sky) + sum(lamp.tint * max(FRONT @ stage.unlit.lamps[lamp.number], 0) for lamp in lamps)
     picture, below = np.split(curve(np.concatenate([linear, np.clip(even * gains, 0, 1).astype(np.float32)]), rng), 2)
     head = (1 - shares[..., -1]).astype(np.float32)
     skin = np.clip(head - shares[..., PARTS.index("hair")] - shares[..., PARTS.index("clothes")], 0, 1)
@@ -129,6 +137,7 @@ def portray(
         skin,
         skin,
         _fitted(stage, environment, lamps, tone * gains, rng),
+        card * gains,
     )
 
 

@@ -21,6 +21,7 @@ from .unlit import Unlit, random_view, scene_of, trace_unlit
 SIDE = 256
 CLOSEST, WIDEST = 1.25, 2.0  # side of the picture in sides of the face's landmarks
 RAYS = 160
+FRONT = np.float32([0, -1, 0])  # the way a head looks, in its axes
 
 
 @dataclass(frozen=True)
@@ -49,9 +50,13 @@ class Sitter:
         self.normals = vertex_normals(figure.head)
         self.transfer = radiance_transfer(self.bald, figure.head.vertices, self.normals, RAYS)
 
-    def stage(self, rng: np.random.Generator) -> RelightableView:
-        """Return a view from anywhere before the person."""
-        view = random_view(self.scene.figure, rng, SIDE, rng.uniform(CLOSEST, WIDEST))
+    def stage(self, rng: np.random.Generator, side: int = SIDE, aside_deg: float = 180) -> RelightableView:
+        """Return a view from before the person, at most `aside_deg` from the front; side in pixels."""
+        margin = rng.uniform(CLOSEST, WIDEST)
+        while True:
+            view = random_view(self.scene.figure, rng, side, margin)
+            if np.degrees(np.arccos(-view.axis @ FRONT)) <= aside_deg:
+                break
         unlit = trace_unlit(self.scene, view, rng)
         mesh = self.bald.mesh
         face, bary, _ = raster.render_view(self.bald, view, 1)

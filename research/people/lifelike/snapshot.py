@@ -32,8 +32,8 @@ GLOSS = {
     "background": (1.0, 0.0),
 }
 """Roughness, and reflectance at normal incidence."""
-SKIN, HAIR, BROW, BEARD, LIPS, CLOTHES = (
-    PARTS.index(name) for name in ("skin", "hair", "brows", "beard", "lips", "clothes")
+SKIN, HAIR, BROW, BEARD, LIPS, EYES, CLOTHES = (
+    PARTS.index(name) for name in ("skin", "hair", "brows", "beard", "lips", "eyes", "clothes")
 )
 
 

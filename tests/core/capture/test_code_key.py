@@ -90,7 +90,7 @@ def test_the_closure_is_all_that_a_stage_imports_however_far_away():
         ("stages/cameras/colmap.py", {"cameras"}),
         ("__init__.py", set()),
         ("worker/runner.py", set()),
-        ("weights/tones.json", {"solve"}),
+        ("weights/tones.json", {"solve", "upscale"}),
         ("weights/upscaler.safetensors", {"upscale"}),
         ("weights/delighter.safetensors", {"delight"}),
         ("weights/prior.safetensors", {"solve", "upscale"}),

@@ -116,7 +116,7 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     evidence, recipe = read_evidence(capture, read_head(capture), SIZE), replace(OURS, guidance="proximal", steps=10)
     start = start_solve(prior, evidence, torch.from_numpy(TONE), 8.0, recipe, make_head_cells)
     assert [(round(m.row / 4), round(m.column / 4)) for m in start.marks] == [(round(row / 4), round(column / 4))]
-    sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(0))
+    sampler = Sampler(prior.of_tone(start.working_tone), start.recipe, seed_noise(0))
     result = maps.finish_maps(sampler.sample(start.observations, start.state), evidence, start)
 
     def contrast(image):

@@ -12,7 +12,7 @@ from tests.fixtures.flat_patch import assembled, height_map, sockets  # noqa: E4
 
 EXPECTED = """
 ShaderNodeAttribute WildCap Regions: attribute_name=wildcap_roughness
-ShaderNodeGroup WildCap Skin: Specular Amount=1.25, Roughness=0.45, IOR=1.4, Subsurface=1, Subsurface Scale=0.003, Displacement=0, Midlevel=0, Oil=0
+ShaderNodeGroup WildCap Skin: Specular Amount=1.25, Roughness=0.45, IOR=1.4, Subsurface=1, Subsurface Scale=0.003, Displacement=0, Midlevel=0, Oil=0, Tone=1 1 1 1, Skin=1
 ShaderNodeNormalMap WildCap Normal Map: uv_map=UVMap
 ShaderNodeOutputMaterial Material Output
 ShaderNodeTexImage WildCap Albedo: diffuse_albedo.png sRGB, interpolation=Cubic, extension=EXTEND
@@ -34,10 +34,11 @@ WildCap Skin / ShaderNodeMath WildCap Oily: operation=MULTIPLY, use_clamp=True, 
 WildCap Skin / ShaderNodeMath WildCap Regions: operation=MULTIPLY_ADD, use_clamp=True
 WildCap Skin / ShaderNodeMath WildCap Specular Level: operation=MULTIPLY, use_clamp=True
 WildCap Skin / ShaderNodeMix WildCap Given Back: B=1.048 1.073 1.078 1
+WildCap Skin / ShaderNodeMix WildCap Tone
 WildCap Skin / WildCap Coat.Value -> WildCap Principled.Coat Weight
 WildCap Skin / WildCap Displacement.Displacement -> WildCap Output.Displacement
 WildCap Skin / WildCap Given Back.Result -> WildCap Principled.Base Color
-WildCap Skin / WildCap Input.Albedo -> WildCap Given Back.A
+WildCap Skin / WildCap Input.Albedo -> WildCap Tone.A
 WildCap Skin / WildCap Input.Displacement -> WildCap Displacement.Scale
 WildCap Skin / WildCap Input.Height -> WildCap Displacement.Height
 WildCap Skin / WildCap Input.IOR -> WildCap Principled.IOR
@@ -48,15 +49,18 @@ WildCap Skin / WildCap Input.Region -> WildCap Oily.Value
 WildCap Skin / WildCap Input.Region -> WildCap Regions.Value
 WildCap Skin / WildCap Input.Roughness -> WildCap Regions.Value
 WildCap Skin / WildCap Input.Roughness -> WildCap Regions.Value
+WildCap Skin / WildCap Input.Skin -> WildCap Tone.Fac
 WildCap Skin / WildCap Input.Specular -> WildCap Specular Level.Value
 WildCap Skin / WildCap Input.Specular Amount -> WildCap Specular Level.Value
 WildCap Skin / WildCap Input.Subsurface -> WildCap Given Back.Fac
 WildCap Skin / WildCap Input.Subsurface -> WildCap Principled.Subsurface Weight
 WildCap Skin / WildCap Input.Subsurface Scale -> WildCap Principled.Subsurface Scale
+WildCap Skin / WildCap Input.Tone -> WildCap Tone.B
 WildCap Skin / WildCap Oily.Value -> WildCap Coat.Value
 WildCap Skin / WildCap Principled.BSDF -> WildCap Output.BSDF
 WildCap Skin / WildCap Regions.Value -> WildCap Principled.Roughness
 WildCap Skin / WildCap Specular Level.Value -> WildCap Principled.Specular IOR Level
+WildCap Skin / WildCap Tone.Result -> WildCap Given Back.A
 WildCap Skin.BSDF -> Material Output.Surface
 WildCap Skin.Displacement -> Material Output.Displacement
 WildCap Specular.Color -> WildCap Skin.Specular

@@ -3,12 +3,14 @@
 """The white point and the tone's certainty in the panel: a click on a card in a frame, a ColorChecker by the solver,
 and words that are true."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tests.fixtures import standin
+from tests.fixtures.recorded import make_entry
 from tests.fixtures.refused import refuses
 
 bpy = pytest.importorskip("bpy")
@@ -73,7 +75,12 @@ def estimate(addon, monkeypatch):
 @pytest.mark.parametrize(
     ("click", "tool", "figures", "kept"),
     [
-        ("estimate_skin_tone", "skin_tone", {"skin_tone_srgb": [0.5, 0.4, 0.3]}, lambda item: item.use_skin_tone),
+        (
+            "estimate_skin_tone",
+            "skin_tone",
+            {"skin_tone_srgb": [0.5, 0.4, 0.3]},
+            lambda item: item.estimated_tone[0] == 0.5,
+        ),
         (
             "find_color_checker",
             "white_point",
@@ -95,14 +102,31 @@ def test_undo_of_what_came_after_an_estimate_leaves_the_estimate(item, estimate,
     assert bpy.data.objects["Cube"].location.x == 0 and kept(bpy.context.scene.wildcap.captures[0])
 
 
+def test_estimate_counts_until_another_solve_has_made_its_own(addon, capture, item, estimate):
+    def solve(hour: str) -> None:
+        figures = {"skin_tone_srgb": [0.7, 0.6, 0.5], "skin_tone_source": "scene", "skin_tone_deviation_l": 6.0}
+        entry = make_entry(figures=figures, finished=f"2026-11-22T{hour}:00:00")
+        record = {"format": 2, "source": "", "stages": {"solve": entry}}
+        (capture / "capture.json").write_text(json.dumps(record), encoding="utf-8")
+        addon("status").refresh(bpy.context)
+
+    tones = addon("tones")
+    solve("10")
+    assert tones.estimate(item) == ((0.7, 0.6, 0.5), 6.0)
+    estimate("estimate_skin_tone", {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_deviation_l": 2.0})
+    assert tones.estimate(item)[0] == pytest.approx((0.5, 0.4, 0.3)), "by a white point since, perhaps"
+    solve("11")
+    assert tones.estimate(item) == ((0.7, 0.6, 0.5), 6.0)
+
+
 def test_the_panel_says_where_the_tone_comes_from(addon, item, estimate):
-    words = addon("solve.panel").tone_words
+    words = addon("solve.tone_panel").tone_words
     figures = {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_group": "tan"}
     estimate("estimate_skin_tone", {**figures, "skin_tone_deviation_l": 6.4, "skin_tone_source": "scene"})
-    assert "±6" in words(item, None) and item.use_skin_tone
+    assert "±6" in words(item, None) and not item.use_skin_tone, "it is marked; nobody has chosen it"
     estimate("estimate_skin_tone", {**figures, "skin_tone_deviation_l": 2.0, "skin_tone_source": "white point"})
     assert words(item, None) == "tan, ± 2 L*, by white point"
-    item.use_skin_tone = False
+    item.estimated_tone, item.tone_source = (0, 0, 0), ""
     finding = {"stage": "solve", "problem": "Estimated, ±7.", "remedy": "Choose it.", "stopped": False}
     assert words(item, addon("status").Status(findings=(finding,))) == "Estimated, ±7. Choose it."
     assert "when the maps are solved" in words(item, None)

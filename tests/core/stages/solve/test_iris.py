@@ -18,11 +18,12 @@ from core.face.eye_reader import SIDE_PX, EyeShares  # noqa: E402
 from core.face.head import FilmedHead  # noqa: E402
 from core.geometry import meshes, raster  # noqa: E402
 from core.imaging import images  # noqa: E402
-from core.stages.solve import iris  # noqa: E402
+from core.stages.solve import iris, iris_colours  # noqa: E402
 from research.people.lifelike import eyes, shape  # noqa: E402
 from research.people.painted_head import place_camera  # noqa: E402
 
 SEED, SKIN = 4, np.array([0.42, 0.26, 0.19])
+LID_SHADE = 0.58  # of the light on the eyes, under which measured people's whites are as dark as they are
 AZIMUTHS = (-24, -8, 8, 24)
 
 
@@ -51,16 +52,17 @@ class Painted:
         whole = head.caster.mesh
         face, bary, _ = raster.render_view(head.caster, view)
         normal = raster.interpolate(meshes.vertex_normals(whole), whole.faces, face, bary)
-        colour = np.tile(self.albedo[0, 0], (*face.shape, 1))
+        colour, lids_leave = np.tile(self.albedo[0, 0], (*face.shape, 1)), np.ones((*face.shape, 1))
         first = len(self.opened.skin.faces)
         for ball in self.opened.balls:
             of_ball = (face >= first) & (face < first + len(ball.mesh.faces))
             corners = ball.mesh.uvs[ball.mesh.faces[face[of_ball] - first]]
             uv = (corners * bary[of_ball][:, :, None]).sum(1)
             colour[of_ball] = raster.sample(self.picture, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512)
+            lids_leave[of_ball] = LID_SHADE
             first += len(ball.mesh.faces)
         shade = 0.5 + 0.4 * np.clip(normal @ np.array([0.3, -0.9, 0.3]), 0, 1)
-        picture = colour * shade[..., None] * lit
+        picture = colour * lids_leave * shade[..., None] * lit
         for ball in self.opened.balls:  # a window in the cornea
             x, y = view.project((ball.centre + ball.radius * ball.gaze + [0.0015, 0, 0.0015])[None])[0][0].astype(int)
             picture[y - 3 : y + 3, x - 3 : x + 3] = 1
@@ -74,11 +76,11 @@ class Painted:
         return iris.measure_iris_colour(self.views, self.head, side, self.eyeball(side), self.albedo, Reporter("solve"))
 
     def true(self) -> np.ndarray:
-        """The median of the picture between pupil and rim."""
+        """The median of the picture between pupil and rim, as the lids show it."""
         y, x = (np.mgrid[0:512, 0:512] + 0.5) / 512 - 0.5
         angle = np.pi * (2 * np.hypot(x, y)).clip(0, 1) ** (1 / 0.6)
         share = np.sin(angle) * self.opened.balls[0].radius * 1000 / eyes.IRIS_MM
-        return np.median(self.picture[(share > 0.55) & (share < 0.85) & (angle < 1)], axis=0)
+        return LID_SHADE * np.median(self.picture[(share > 0.55) & (share < 0.85) & (angle < 1)], axis=0)
 
 
 def apart(found, true) -> float:
@@ -122,6 +124,25 @@ def test_the_colour_of_an_iris_is_found_under_warm_light_and_none_where_no_frame
     assert iris.measure_iris_colour(brown.views, brown.head, 0, behind, brown.albedo, Reporter("solve")) is None
 
 
+def test_an_iris_does_not_follow_the_tone_that_was_chosen(brown):
+    skin, found = brown.albedo, brown.found(0)
+    brown.albedo = skin * np.float32([0.2, 0.15, 0.1])
+    assert np.abs(np.divide(brown.found(0), found) - 1).max() < 0.01
+    brown.albedo = skin
+
+
+def test_the_white_tells_more_of_an_iris_than_skin_does_and_hidden_it_is_not_asked():
+    """Of people of measured eyes: where the white is hidden a dark iris beside fair skin may be fair skin in the shade."""
+    people = iris_colours.read_measured_eyes()
+    drawn = np.exp(np.random.default_rng(0).multivariate_normal(people.mean, people.covariance, 400))
+    irises, whites, skins = drawn[:, :3], drawn[:, 3:6], drawn[:, 6:]
+    both = [iris_colours.expect_iris(*ratios) for ratios in zip(irises / skins, irises / whites, strict=True)]
+    alone = [iris_colours.expect_iris(ratio) for ratio in irises / skins]
+    nobody = np.tile(np.exp(people.mean[:3]), (400, 1))
+    off = [np.sqrt(np.square(np.log(answer / irises)).mean()) for answer in (both, alone, nobody)]
+    assert off[0] < 0.6 * off[1] and off[1] < 0.9 * off[2], off
+
+
 def test_a_blue_iris_is_found_beside_dark_skin_past_a_blink(tmp_path):
     dark = np.array([0.06, 0.035, 0.022])
     person = Painted(tmp_path, (0.048, 0.078, 0.115), tone=dark, lit=(0.9, 0.9, 0.9), blink=2)
@@ -139,10 +160,11 @@ def test_the_iris_is_what_lids_and_pupil_leave_of_it():
     move = np.array([[1.0, 0, SIDE_PX / 2 - middle[0]], [0, 1.0, SIDE_PX / 2 - middle[1]]])
     share = np.zeros((SIDE_PX, SIDE_PX), np.float32)
     share[SIDE_PX // 2 :] = 1
-    rows, columns = iris.find_iris_pixels(view, eye, EyeShares(share, share, move), shape)
+    (rows, columns), _ = iris.find_eye_pixels(view, eye, EyeShares(share, share, move), shape)
     x, y = columns + 0.5 - middle[0], rows + 0.5 - middle[1]
     assert len(rows) == pytest.approx(np.pi * radius**2 * (0.85**2 - 0.55**2) / 2, rel=0.1)
     assert (np.hypot(x, y) / radius > 0.54).all() and (np.hypot(x, y) / radius < 0.86).all() and y.min() > -1.5
     shut = EyeShares(share, np.zeros_like(share), move)
-    assert not len(iris.find_iris_pixels(view, eye, shut, shape)[0])
-    assert not len(iris.find_iris_pixels(view, replace(eye, iris_radius=0.0), EyeShares(share, share, move), shape)[0])
+    assert not len(iris.find_eye_pixels(view, eye, shut, shape)[0][0])
+    unseen = replace(eye, iris_radius=0.0)
+    assert not len(iris.find_eye_pixels(view, unseen, EyeShares(share, share, move), shape)[0][0])

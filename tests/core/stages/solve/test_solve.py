@@ -15,6 +15,7 @@ import pytest
 import torch
 
 from core.capture.capture import Capture
+from core.capture.files import write_json
 from core.capture.messages import CancelledError, Failed, Preview, Progress, Reporter
 from core.capture.stages import MAPS
 from core.face import template
@@ -83,6 +84,8 @@ def test_solve_writes_all_maps_of_the_asked_tone(finished):
     assert np.abs(diffuse * shading - texture)[skin].mean() < 0.05 * texture[skin].mean()
     normal = images.read_data(capture.maps / "normal.png")[..., :3] * 2 - 1
     assert np.abs(np.linalg.norm(normal, axis=-1) - 1).max() < 0.01 and (normal[..., 2] > 0.5).mean() > 0.95
+    weight = images.read_mask(capture.skin_weight)
+    assert weight.shape == (SIZE, SIZE) and np.median(weight[skin]) > 0.99, "of what follows another tone"
     assert capture.picture("solve", "texture_albedo_shading").is_file()
     assert not (capture.checkpoints / "solve.safetensors").exists()
 
@@ -176,6 +179,18 @@ def test_the_border_of_a_shadow_on_the_neck_tells_what_is_missing_there(capture)
     assert neck.sum() > 50 and begun.observations[1].missing.numpy()[neck].mean() > 0.12
 
 
+def test_a_light_that_was_known_is_not_fitted_again(tmp_path):
+    """What the frames of a torch leave is skin, and a change from left to right stays in the albedo."""
+    capture = make(tmp_path / "torch.wildcap")
+    images.write_linear(capture.texture, mean_face() * (0.7 + 0.3 * X)[..., None].astype(np.float32))
+    images.write_data(capture.shadow_mask_auto, np.zeros((SIZE, SIZE), np.float32))
+    write_json(capture.torchlight, {})
+    solved(capture)
+    shading = images.read_linear(capture.maps / "shading.exr").mean(-1)
+    middle = shading[SIZE // 3 : 2 * SIZE // 3, SIZE // 4 : 3 * SIZE // 4]
+    assert np.ptp(middle) < 0.02 * middle.mean()
+
+
 def test_a_cancel_is_heard_and_something_is_said_before_the_first_step(capture):
     """While the light's scales are searched, and at each of the 72 penumbras that are tried."""
     said, looks = [], []
@@ -199,7 +214,7 @@ def test_under_the_light_that_the_split_tells_the_skin_has_its_tone(evidence):
     assert "grid" in {phase for phase, _, _ in begun.recipe.phases}, "the split's light is taken"
     o, skin = begun.observations[1], evidence.skin
     found = start.mean_tone(o.texture / o.shader.main(begun.state.lights), skin)
-    assert torch.allclose(found / start.mean_tone(albedo(face), skin), torch.ones(3), atol=0.003), found
+    assert torch.allclose(found / begun.working_tone, torch.ones(3), atol=0.003), found
 
 
 def test_unusable_inputs_are_problems(capture):

@@ -177,6 +177,18 @@ def test_the_stage_takes_the_network(capture, busy, monkeypatch):
     assert np.abs(coded - resampled).max() > 0.02
 
 
+def test_the_networks_detail_does_not_hang_on_the_tone(capture, busy, monkeypatch):
+    monkeypatch.setattr("core.stages.upscale.enlarge.load_network", lambda: busy)
+    gain, small = np.float32([0.3, 0.25, 0.2]), images.read_linear(capture.maps / "diffuse_albedo.exr")
+    results = []
+    for factor in (np.ones(3, np.float32), gain):
+        images.write_linear(capture.maps / "diffuse_albedo.exr", small * factor)
+        run(capture, "network")
+        results.append(images.read_linear(capture.maps_4k / "diffuse_albedo.png"))
+    whole = (results[0] > 0.02) & (results[0] < 0.98)
+    assert whole.mean() > 0.2 and np.abs(results[1] / gain - results[0])[whole].max() < 2e-3
+
+
 @pytest.mark.parametrize("size", [96, 128, 200])
 def test_the_network_ends_at_any_size(busy, monkeypatch, size):
     """Four times 32 is what it gives; more or less is resampled from that."""
