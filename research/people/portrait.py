@@ -18,7 +18,7 @@ from .environments import Environment, background_radiance, random_environment
 from .fitted_light import FittedLight, LampOnHead, fitted_light
 from .light import draw_sheet
 from .olat import BASIS, DIRECTIONS, LightStage, mirror_environment, transport
-from .response import curve, develop, expose
+from .response import curves, develop, expose
 from .sight import Sight, landmarks_of, random_camera, trace_sight
 from .skin import Skin
 
@@ -93,7 +93,7 @@ def relight_sight(
     haired, tone = rng.random() < 0.35, _tone(sight, albedo)
     plain = with_lips(tone, albedo, sight.mask("lips"))
     even = np.clip(sight.picture(plain * diffuse + specular) * gains, 0, 1).astype(np.float32)
-    picture, even = np.split(curve(np.concatenate([linear, even]), rng), 2)
+    picture, even = curves(linear, even, rng)
     bare = np.ones_like(head)
     if haired:
         picture, hair = _haired(picture, sight, rng)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scene radiance to the file a phone writes: exposure, white balance, tone curve, blur, noise and compression."""
+"""Scene radiance to the file a phone writes: exposure, white balance, tone mapping, blur, noise and compression."""
 
 from __future__ import annotations
 
@@ -29,9 +29,34 @@ def expose(radiance: np.ndarray, metered_on: np.ndarray, rng: np.random.Generato
     return np.clip(radiance * gains, 0, 1).astype(np.float32), gains
 
 
+TONE_MAPPED = 0.5
+"""Share of the pictures that are mapped locally. A phone's high dynamic range lifts large shadows, its local contrast
+deepens them."""
+
+
+def curves(linear: np.ndarray, even: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Encode a picture, and the same without pigment, as sRGB under one camera's tone mapping.
+
+    linear, even [S, S, 3]. The gain of each place is found on the picture and given to both: whatever it is, it counts
+    as light, so that pigment keeps the contrast that the curve leaves it.
+    """
+    gain = local_gain(linear, rng) if rng.random() < TONE_MAPPED else 1.0
+    return tuple(np.split(curve(np.concatenate([linear * gain, even * gain]), rng), 2))
+
+
+def local_gain(linear: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return the factor [S, S, 1] of a local tone mapping, 1 in the mean of its logarithm.
+
+    What is larger than a Gaussian, in the logarithm of the luminance, is compressed, or stretched a little.
+    """
+    log = np.log(np.maximum(linear.mean(-1), 4e-3)).astype(np.float32)
+    large = cv2.GaussianBlur(log, (0, 0), len(log) * np.exp(rng.uniform(np.log(0.03), np.log(0.15))))
+    return np.exp(-rng.uniform(-0.15, 0.45) * (large - large.mean()))[..., None]
+
+
 def curve(linear: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Encode linear [..., 3] as sRGB with a camera's own mild contrast about the middle and saturation."""
-    srgb = images.linear_to_srgb(linear)
+    srgb = images.linear_to_srgb(np.minimum(linear, 1))
     contrast, lift = rng.normal(0, 0.25), rng.normal(0, 0.02)
     srgb = srgb + contrast * srgb * (1 - srgb) * (2 * srgb - 1) + lift * (1 - srgb)
     grey = srgb.mean(-1, keepdims=True)

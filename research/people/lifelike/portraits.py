@@ -20,7 +20,7 @@ from core.imaging import images
 from ..environments import Environment, irradiance, random_environment
 from ..fitted_light import FittedLight, LampOnHead, fitted_light
 from ..portrait import Portrait, draw_lamps, with_lips
-from ..response import curve, develop, expose
+from ..response import curves, develop, expose
 from .clutter import cover_person, open_mouth, paint_backdrop
 from .markings import moles, stains, tufts
 from .relightable import FRONT, RelightableView
@@ -123,7 +123,7 @@ def portray(
     plain = with_lips(tone, albedo, shares[..., LIPS])
     even = plain * ((1 - grown) * diffuse + grown * own) + (1 - grown) * shine + grown * own_shine
     card = irradiance(FRONT, sky) + sum(lamp.tint * max(FRONT @ stage.unlit.lamps[lamp.number], 0) for lamp in lamps)
-    picture, below = np.split(curve(np.concatenate([linear, np.clip(even * gains, 0, 1).astype(np.float32)]), rng), 2)
+    picture, below = curves(linear, np.clip(even * gains, 0, 1).astype(np.float32), rng)
     head = (1 - shares[..., -1]).astype(np.float32)
     skin = np.clip(head - shares[..., PARTS.index("hair")] - shares[..., PARTS.index("clothes")], 0, 1)
     shadow, strong = _shadow(stage, lamps, grown[..., 0], sky)
