@@ -16,9 +16,10 @@ from research.people.identities import subject_mesh
 from research.training import delighter, people, portraits
 from research.training.descent import Run
 from research.training.networks import train
+from research.training.shading_errors import quantile_error
 
 CONFIG = {
-    "model": {"widths": [16, 16, 16, 16], "depths": [1, 1, 1, 1], "bins": 3},
+    "model": {"widths": [16, 16, 16, 16], "depths": [1, 1, 1, 1], "bins": 3, "answers": 5},
     "training": dict(pairs=1, echo=2, rate=1e-3, minutes=1, skins=1, people=1, views=1, held_out=1, seed=0, workers=0),
 }
 
@@ -54,6 +55,12 @@ def test_what_the_studio_gave_real_people_in_the_large_costs_nothing():
     assert cost(coarse, coarse, True) < 0.15 * size, "but at the border"
     assert cost(coarse, -coarse, True) == pytest.approx(size, rel=1e-3)
     assert cost(fine, fine, True) == pytest.approx(fine.abs().mean().item(), rel=0.02)
+
+
+def test_the_size_of_errors_is_learnt_as_their_quantile():
+    errors, one = torch.linspace(-1, 1, 4001).view(1, 1, 1, -1), torch.ones(1, 1, 1, 4001)
+    costs = {size: quantile_error(errors, np.log(size) * one, one, 0.68, 1e-6) for size in (0.6, 0.66, 0.68, 0.7, 0.76)}
+    assert min(costs, key=costs.get) == 0.68
 
 
 def make_plain_sights(store, seed, **_):

@@ -30,10 +30,10 @@ from .networks import Card, Training
 from .portraits import PortraitBatch, mirrored, repainted
 from .prior import named_data
 from .seeds import panorama_names, training_seeds
-from .shading_errors import mean_deviation, mean_size, slope_error, split_tone, without_coarse
+from .shading_errors import mean_deviation, mean_size, quantile_error, slope_error, split_tone, without_coarse
 from .sights import SightStore, Source, stack_examples
 
-_MODEL = {"widths": [64, 128, 192, 224], "depths": [2, 2, 2, 2], "bins": 5}
+_MODEL = {"widths": [64, 128, 192, 224], "depths": [2, 2, 2, 2], "bins": 5, "answers": 5}
 CONFIGS = {
     "cpu": {
         "model": _MODEL,
@@ -56,9 +56,12 @@ SHARES = {"real": 0.34, "person": 0.48, "subject": 0.18}
 """Of the sights: real people, synthetic people with hair and open eyes, bald subjects."""
 FINE_PX = 10.0
 """Deviation of the blur that parts what is known of real people from what is not: half an eighth of a face."""
-TONE, SLOPE, AGREEMENT, SHADOW = 0.25, 1.0, 0.25, 0.3
+TONE, SLOPE, AGREEMENT, SHADOW, SIZE = 0.25, 1.0, 0.25, 0.3, 0.1
 """Weights beside the log-shading's error: its mean over the face, its slopes, the albedo of one face under two lights,
-the shadows."""
+the shadows, the size of the error."""
+WITHIN = 0.68
+"""Share of the errors that lie within the size that the network states, as within a standard deviation."""
+LEAST_ERROR, USUAL_ERROR = 0.01, 0.15  # natural log; the logarithm of a smaller one is not learnt
 
 
 def prepare(run: Run, options: dict, report: Reporter) -> None:
@@ -135,7 +138,7 @@ def losses(network: DelightNet, batch: PortraitBatch) -> dict[str, torch.Tensor]
     Of real people the studio's light is not quite known: what two lights on one sight have in common counts only as far
     as it is finer than an eighth of the face, and their difference at all scales.
     """
-    shading, shadow = _predict(network, batch.layers)
+    shading, shadow, size = _predict(network, batch.layers)
     both, real = batch.weight[0::2] * batch.weight[1::2], batch.real > 0.5
     weight = torch.where(real, both.repeat_interleave(2, 0), batch.weight)
     tone, error = split_tone(shading - batch.shading, weight)
@@ -149,22 +152,27 @@ def losses(network: DelightNet, batch: PortraitBatch) -> dict[str, torch.Tensor]
         "slope": SLOPE * slope_error(error, weight),
         "agreement": AGREEMENT * mean_size(2 * change, both),
         "shadow": SHADOW * (unsure * batch.shadow_weight).sum() / batch.shadow_weight.sum().clamp_min(1),
+        "size": SIZE * quantile_error(error.detach().mean(1, keepdim=True), size, weight * ~real, WITHIN, LEAST_ERROR),
     }
 
 
-def _predict(network: DelightNet, layers: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """Return log-shading [N, 3, S, S] less the picture's middle, and shadow logits [N, 1, S, S]."""
+def _predict(network: DelightNet, layers: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Return log-shading [N, 3, S, S] less the picture's middle, shadow logits and log-size of errors [N, 1, S, S]."""
     device = layers.device.type
     with torch.autocast(device, torch.bfloat16, enabled=fast_dtype(device) == torch.bfloat16):
         grid = network(layers.contiguous(memory_format=torch.channels_last))
     answer = slice_grid(grid.float(), layers[:, 3:6])
-    return answer[:, :3], answer[:, 3:]
+    return answer[:, :3], answer[:, 3:4], answer[:, 4:]
 
 
 def load_start(network: DelightNet, weights: dict[str, torch.Tensor]) -> None:
-    """Load weights; those of a network without bins say the same in all of them."""
-    if len(weights["out.bias"]) < len(network.out.bias):
-        weights |= {name: weights[name].repeat_interleave(network.bins, 0) for name in ("out.weight", "out.bias")}
+    """Load weights; those of a network without bins say the same in all of them, and nothing of its errors."""
+    for name in ("out.weight", "out.bias"):
+        if len(weights[name]) == 4:
+            weights[name] = weights[name].repeat_interleave(network.bins, 0)
+        missing = len(network.out.bias) - len(weights[name])
+        usual = float(np.log(USUAL_ERROR)) if name == "out.bias" else 0.0
+        weights[name] = torch.cat([weights[name], torch.full((missing, *weights[name].shape[1:]), usual)])
     network.load_state_dict(weights)
 
 
@@ -172,7 +180,8 @@ def measure(network: DelightNet, batch: PortraitBatch) -> dict[str, float]:
     """Measure the network on those held-out portraits whose geometry is known.
 
     geometry, picture (without geometry), none (the picture as it is): mean absolute error of the log-albedo about its
-    own mean over the skin, natural log; iou_geometry, iou_picture: intersection over union of the shadows.
+    own mean over the skin, natural log; iou_geometry, iou_picture: intersection over union of the shadows;
+    within_geometry, within_picture: share of the errors within the size that the network states.
     """
     device = next(network.parameters()).device
     batch = batch._make(part[batch.layers[:, 15].amax((1, 2)) > 0] for part in batch)
@@ -180,8 +189,11 @@ def measure(network: DelightNet, batch: PortraitBatch) -> dict[str, float]:
     figures = {}
     for name, layers in (("geometry", batch.layers), ("picture", bare)):
         answers = [_predict(network, rows.to(device)) for rows in layers.split(8)]
-        shading, shadow = (torch.cat([answer[k].cpu() for answer in answers]) for k in (0, 1))
+        shading, shadow, size = (torch.cat([answer[k].cpu() for answer in answers]) for k in (0, 1, 2))
         figures[name] = mean_deviation(shading - batch.shading, batch.weight)
+        _, error = split_tone(shading - batch.shading, batch.weight)
+        within = (error.mean(1, keepdim=True).abs() < size.exp()) * batch.weight
+        figures[f"within_{name}"] = (within.sum() / batch.weight.sum()).item()
         predicted, true, sure = shadow > 0, batch.shadow > 0.5, batch.shadow_weight > 0.9
         union = ((predicted | true) & sure).sum().clamp_min(1)
         figures[f"iou_{name}"] = ((predicted & true & sure).sum() / union).item()
@@ -196,7 +208,7 @@ def describe(state: dict) -> Card:
         f"(research/people), and photographs of {len(data['real'])} real people, relit ({london.ATTRIBUTION}),",
         "subject_ of held-out bald subjects, and person_ of held-out people: mean error of the log-albedo about its "
         "own mean over the face (natural log), told the geometry or the picture only, beside the picture as it is; "
-        "intersection over union of the shadows",
+        "intersection over union of the shadows; share of the errors within the size that the network states",
         skins_use="some wear one of {}, carried into the built-in UVs",
         started="" if data["started"] == SCRATCH else " --start delighter.safetensors",
         more={name: data[name] for name in ("panoramas", "people", "real", "started")},

@@ -10,16 +10,21 @@ from pathlib import Path
 import numpy as np
 
 from ..people.lifelike import portraits, relightable
+from ..people.lifelike.expression import sample_expression
 from ..people.lifelike.figure import make_figure
 from .portraits import make_example
 from .sights import SightStore
 
 TEXELS = 512  # of a figure's maps: pixels of a crop are larger than theirs
+MOVED = 0.5  # share of the figures that smile, squint, frown or raise their brows
 
 
 def make_sights(store: SightStore, seed: int) -> None:
     """Trace the sights of one figure: some four seconds, and one to three per view."""
-    sitter = relightable.Sitter(make_figure(seed, TEXELS), np.random.default_rng([seed, 92]))
+    rng = np.random.default_rng([seed, 94])
+    expression = sample_expression(rng) if rng.random() < MOVED else None
+    figure = make_figure(seed, TEXELS, expression=expression)
+    sitter = relightable.Sitter(figure, np.random.default_rng([seed, 92]))
     store.path(seed, 0).parent.mkdir(parents=True, exist_ok=True)
     for view in range(store.count):
         relightable.save(store.path(seed, view), sitter.stage(np.random.default_rng([seed, 93, view])))

@@ -19,6 +19,18 @@ def mean_size(error: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
     return (error.abs() * weight).sum() / weight.sum().clamp_min(1) / error.shape[1]
 
 
+def quantile_error(
+    error: torch.Tensor, log_size: torch.Tensor, weight: torch.Tensor, share: float, least: float
+) -> torch.Tensor:
+    """Return the pinball loss of a size, a scalar: least where a `share` of the errors' magnitudes lies below it.
+
+    error, log_size, weight [N, 1, S, S]; in the logarithm, from `least` on (Koenker and Bassett 1978).
+    """
+    over = (error.abs() + least).log() - log_size
+    loss = torch.maximum(share * over, (share - 1) * over)
+    return (loss * weight).sum() / weight.sum().clamp_min(1)
+
+
 def slope_error(error: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
     """Return how much the error changes over 1 to 8 pixels: remains of edges, and outlines."""
     total, slopes = weight.sum().clamp_min(1), 0.0

@@ -82,23 +82,27 @@ def _guide(log: torch.Tensor, cells: tuple[int, int]) -> torch.Tensor:
 
 
 class DelightNet(Ladder):
-    """Network from [N, CHANNELS, S, S] to a grid [N, 4, bins, S/2, S/2].
+    """Network from [N, CHANNELS, S, S] to a grid [N, answers, bins, S/2, S/2].
 
-    It holds log-shading less the picture's middle, and shadow logits. S is a multiple of 32. The coarsest level attends
-    to all of itself.
+    It holds log-shading less the picture's middle, shadow logits and, if there are five answers, the logarithm of the
+    size within which two in three errors of the log-shading's luminance lie. S is a multiple of 32. The coarsest level
+    attends to all of itself.
     """
 
-    def __init__(self, widths: list[int], depths: list[int], bins: int = 1):
+    def __init__(self, widths: list[int], depths: list[int], bins: int = 1, answers: int = 4):
         super().__init__()
         self.add_levels(widths, depths)
-        self.bins = bins
+        self.bins, self.answers = bins, answers
         self.attention = Attention(widths[-1])
         self.stem, self.enter = (
             nn.Conv2d(CHANNELS, FINE, 4, stride=2, padding=1),
             nn.Conv2d(FINE, widths[0], 2, stride=2),
         )
         self.leave = nn.Conv2d(widths[0], 4 * FINE, 1)  # the finest level, where pictures are large, is kept thin
-        self.last, self.out = nn.Conv2d(2 * FINE, 2 * FINE, 3, padding=1), nn.Conv2d(2 * FINE, 4 * bins, 3, padding=1)
+        self.last, self.out = (
+            nn.Conv2d(2 * FINE, 2 * FINE, 3, padding=1),
+            nn.Conv2d(2 * FINE, answers * bins, 3, padding=1),
+        )
         nn.init.zeros_(self.out.weight)
         nn.init.zeros_(self.out.bias)
 
@@ -109,7 +113,7 @@ class DelightNet(Ladder):
         fine = functional.gelu(self.stem(x))
         x = self.transform(self.enter(fine))
         x = torch.cat([fine, functional.pixel_shuffle(self.leave(x), 2)], 1)
-        return self.out(functional.gelu(self.last(x))).float().unflatten(1, (4, self.bins))
+        return self.out(functional.gelu(self.last(x))).float().unflatten(1, (self.answers, self.bins))
 
 
 class Attention(nn.Module):

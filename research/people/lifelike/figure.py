@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from core.face.lids import OpenHead, open_lids
+from core.face.lids import OpenHead, open_around, open_lids
 from core.face.strands import SkinSurface, Strands
 from core.geometry.meshes import Mesh, joined
 
@@ -18,6 +18,7 @@ from ..regions import regions
 from ..skin import GROUND, Skin, paint_skin
 from . import beards, brows, eyes, head_hair, traits
 from .clothes import shirt
+from .expression import Expression
 from .ground import ground_of
 from .person import Person, sample_person
 from .shape import person_mesh
@@ -49,11 +50,17 @@ class Figure:
     strands: tuple[Strands, ...]
 
 
-def make_figure(person: Person | int, size: int = 2048, facekit: Path | None = None) -> Figure:
+def make_figure(
+    person: Person | int, size: int = 2048, facekit: Path | None = None, expression: Expression | None = None
+) -> Figure:
     """Make a person, or the one of a seed, with maps of `size` texels; the same arguments give the same bytes."""
     person = person if isinstance(person, Person) else sample_person(person)
     head = person_mesh(person.seed, facekit)
-    open_head = open_lids(head, person.openness if person.openness >= OPENEST else 0.0, np.array(person.gaze))
+    openness = person.openness if person.openness >= OPENEST else 0.0
+    open_head = open_lids(head, openness, np.array(person.gaze))
+    if expression is not None:  # the eyeballs stay
+        head = head.moved(head.vertices + expression.moves)
+        open_head = open_around(head, open_head.balls, (openness * expression.lids,) * 2)
     skin, albedo, growth = paint(person, size)
     cloth = shirt(person, head)
     eye = eyes.paint_eyes(np.array(person.iris), open_head.balls[0].radius, person.seed)
