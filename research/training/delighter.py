@@ -38,7 +38,7 @@ CONFIGS = {
     "cpu": {
         "model": _MODEL,
         "training": dict(
-            pairs=2, echo=2, rate=2.5e-4, minutes=1200, skins=48, people=60, views=8, held_out=6, seed=0, workers=1
+            pairs=4, echo=2, rate=2.5e-4, minutes=1200, skins=48, people=60, views=8, held_out=6, seed=0, workers=1
         ),
     },
     "gpu": {
