@@ -8,7 +8,9 @@ LONDON is the folder london_faces; the judges of research/people/london.py are r
 no training has (hdri_extra), and lamps. Columns, natural log, root mean square over the face after one gain per
 channel: the error of the log-albedo, of what is finer than an eighth of the face, and the disagreement between two
 lights on the same sight; each as it is, and at the contrast that suits the answer best, which is one factor on the
-log-albedo of all pictures. ± is the deviation over people. --look writes each picture, its truth and the answers.
+log-albedo of all pictures. ± is the deviation over people. Of a network that states the size of its errors: the share
+of the face, its brows and its eyes whose luminance is no further off. --look writes each picture, its truth and the
+answers.
 """
 
 from __future__ import annotations
@@ -18,17 +20,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import torch
 
 from core.capture.messages import Problem
-from core.face import faces
+from core.face import faces, parser
 from core.face.networks import read_network
 from core.imaging import images
 from core.imaging.normalized_convolution import weighted_blur
 from core.settings.settings import DelightSettings
+from core.stages.delight.evening import ShadingEstimate
 from core.stages.delight.network import WEIGHTS, crop, divide, look_at, square_around
 from core.stages.delight.photograph import delight_photograph
+from core.stages.delight.unet import MIN_LINEAR, DelightNet, slice_grid
 from core.stages.delight.unet import SIDE_PX as NETWORK_PX
-from core.stages.delight.unet import DelightNet
 
 from ...people import london, studio_people
 from ...people.environments import read_panoramas
@@ -54,21 +58,26 @@ class Sitting:
 
 
 def main() -> None:
-    parser = figures.command_line(__doc__, "real_people")
-    parser.add_argument("london", type=Path)
-    parser.add_argument("hdri", type=Path)
-    parser.add_argument("--weights", type=Path, nargs="*", default=[], help="networks beside the shipped one")
-    parser.add_argument("--look", type=Path, help="folder that gets the pictures")
-    options = parser.parse_args()
+    line = figures.command_line(__doc__, "real_people")
+    line.add_argument("london", type=Path)
+    line.add_argument("hdri", type=Path)
+    line.add_argument("--weights", type=Path, nargs="*", default=[], help="networks beside the shipped one")
+    line.add_argument("--look", type=Path, help="folder that gets the pictures")
+    options = line.parse_args()
     sittings = list(sit(options.london, options.hdri))
     answers = {"photograph": lambda srgb: srgb, "flat colour": _flat, "whole path": _whole_path}
     answers["network alone"] = _alone(WEIGHTS)
-    answers |= {f"{path.parent.name}/{path.stem} alone": _alone(path) for path in options.weights}
+    answers |= {path.stem: _alone(path) for path in options.weights}
     record, logs = {}, {}
     for name, answer in answers.items():
         logs[name] = [[_log(answer(srgb)) for srgb in sitting.srgb] for sitting in sittings]
         record[name] = measure(sittings, logs[name])
         print(f"{name:44}", row(record[name]), flush=True)
+    for name, weights in (("network alone", WEIGHTS), *((path.stem, path) for path in options.weights)):
+        net = read_network(DelightNet, weights)
+        if net.answers > 4:
+            record[name] |= {"within": measure_sizes(sittings, net)}
+            print(f"{name:44}", record[name]["within"])
     if options.look:
         _look(options.look, sittings, logs)
     figures.write_record(options.json, "real_people", COMMAND, record)
@@ -136,6 +145,36 @@ def measure(sittings: list[Sitting], logs: list[list[np.ndarray]]) -> dict:
     return result
 
 
+def measure_sizes(sittings: list[Sitting], net: DelightNet) -> dict[str, float]:
+    """Return the share of the errors of log-luminance within the size that a network states: face, brows, eyes."""
+    within = {name: [] for name in ("face", "brows", "eyes")}
+    for sitting in sittings:
+        truth = _log(images.linear_to_srgb(sitting.albedo))
+        face = faces.detect(images.linear_to_srgb(sitting.albedo))
+        parts = parser.parse(images.linear_to_srgb(sitting.albedo), face.landmarks) if face else None
+        for srgb, weight in zip(sitting.srgb, sitting.weight, strict=True):
+            look = _look_at(net, srgb)
+            error = _centred(_log(divide(srgb, look, 0 * look.shadow)[0]) - truth, weight).mean(-1)
+            inside = np.abs(error) < read_size(look, srgb)
+            shares = {"face": weight} | ({name: weight * parts.of(name) for name in ("brows", "eyes")} if parts else {})
+            for name, share in shares.items():
+                within[name].append((inside * share).sum() / max(share.sum(), 1e-6))
+    return {name: round(float(np.mean(values)), 3) for name, values in within.items()}
+
+
+def read_size(look: ShadingEstimate, srgb: np.ndarray) -> np.ndarray:
+    """Return the size [S, S] of the errors that a look states, natural log; 1 off its square."""
+    side = round(look.box[2])
+    log = np.log(np.maximum(crop(images.srgb_to_linear(srgb), look.box, side), MIN_LINEAR))
+    said = slice_grid(look.grid[:, 4:], torch.from_numpy(log.transpose(2, 0, 1))[None])[0, 0].exp().numpy()
+    whole = np.ones(srgb.shape[:2], np.float32)
+    left, top = (int(x) for x in look.box[:2])
+    rows, columns = np.arange(len(whole)) - top, np.arange(whole.shape[1]) - left
+    here_rows, here_columns = ((x >= 0) & (x < side) for x in (rows, columns))
+    whole[np.ix_(here_rows, here_columns)] = said[np.ix_(rows[here_rows], columns[here_columns])]
+    return whole
+
+
 def row(measured: dict) -> str:
     """Format one answer's figures."""
     columns = [measured[name] for name in COLUMNS]
@@ -171,11 +210,15 @@ def _alone(weights: Path) -> Callable[[np.ndarray], np.ndarray]:
     net = read_network(DelightNet, weights)
 
     def answer(srgb: np.ndarray) -> np.ndarray:
-        box = square_around(faces.detect(srgb).landmarks[:, :2])
-        look = look_at(net, box, crop(srgb, box, NETWORK_PX))
+        look = _look_at(net, srgb)
         return divide(srgb, look, np.zeros(look.shading.shape[:2], np.float32))[0]
 
     return answer
+
+
+def _look_at(net: DelightNet, srgb: np.ndarray) -> ShadingEstimate:
+    box = square_around(faces.detect(srgb).landmarks[:, :2])
+    return look_at(net, box, crop(srgb, box, NETWORK_PX))
 
 
 def _look(folder: Path, sittings: list[Sitting], logs: dict[str, list]) -> None:
