@@ -36,7 +36,7 @@ def open_picture(path: Path) -> oiio.ImageInput:
     """
     image = oiio.ImageInput.open(str(path)) if Path(path).is_file() else None  # a pipe would block for ever
     if image is None:
-        raise _unreadable(path, oiio.geterror())
+        raise _unreadable(path, error_of(oiio))
     spec = image.spec()
     if min(spec.width, spec.height, spec.nchannels) < 1 or spec.depth > 1 or spec.deep:
         image.close()
@@ -62,7 +62,7 @@ def read_pixels(path: Path) -> tuple[np.ndarray, oiio.ImageSpec]:
     """
     image = open_picture(path)
     pixels = image.read_image(oiio.FLOAT)
-    error, spec, is_jpeg = image.geterror(), image.spec(), image.format_name() == "jpeg"
+    error, spec, is_jpeg = error_of(image), image.spec(), image.format_name() == "jpeg"
     image.close()
     if pixels is None or error and not is_jpeg:
         raise _unreadable(path, error)
@@ -73,6 +73,14 @@ def read_pixels(path: Path) -> tuple[np.ndarray, oiio.ImageSpec]:
     if fault:
         raise Problem(f"{path} holds {fault}.", advise_remaking(path, SAVE_ANEW))
     return pixels, spec
+
+
+def error_of(source) -> str:
+    """Return the last error of a picture or of the module, "" for none; what it quotes of a file may be no text."""
+    try:
+        return source.geterror()
+    except UnicodeDecodeError:
+        return "its header is damaged"
 
 
 def _has_lost_data(error: str, size: int) -> bool:

@@ -188,3 +188,10 @@ def test_a_picture_whose_orientation_is_text_is_upright(tmp_path):
     path.write_bytes(stored.replace(date, orientation))
     assert isinstance(oiio.ImageInput.open(str(path)).spec().getattribute("Orientation"), str)
     assert images.read_srgb(path).shape == (8, 16, 3)
+
+
+def test_a_header_whose_text_is_no_text_is_damaged(tmp_path):
+    images.write_linear(tmp_path / "whole.exr", np.full((8, 8, 3), 0.5, np.float32))
+    whole = (tmp_path / "whole.exr").read_bytes()
+    (tmp_path / "kind.exr").write_bytes(whole.replace(b"chlist", b"\xbahlist", 1))
+    refused(lambda: images.read_linear(tmp_path / "kind.exr"), "kind.exr", "header is damaged")
