@@ -39,6 +39,8 @@ GROUND_PX, LEAST_CELLS = 24, 12
 """Side of the squares over which the ground is averaged, and the minimum number of them in both of two frames."""
 SURE = 2.0
 """Deviations beyond which a change is one."""
+OF_MEDIAN = 1.2533
+"""Standard error of the median of n normal values, times the root of n, in their deviations."""
 ERROR_LOG, METADATA_LOG = 0.005, 0.1
 """Deviations, in natural log units, of one comparison (compression, lens) and of an exposure by the metadata (rounded,
 and followed by a tone curve)."""
@@ -100,8 +102,8 @@ class Link:
 def gains_of(contents: list[Content], check=lambda: None) -> np.ndarray:
     """Return factors [N, 3] in linear light that even the frames out, 1 for the median frame.
 
-    Exactly 1 throughout if the change is no larger than what shading may account for. `check` is called between
-    comparisons.
+    Exactly 1 throughout if the change is no larger than what shading may account for, or unsure comparisons. `check` is
+    called between comparisons.
     """
     count = len(contents)
     steps = range(1, count) if count <= ALL_PAIRS_FRAMES else STEPS_FRAMES
@@ -118,10 +120,11 @@ def gains_of(contents: list[Content], check=lambda: None) -> np.ndarray:
         links += [Link(np.full(3, exposure - stated[0]), METADATA_LOG) for exposure in stated]
     if not links:
         return np.ones((count, 3))
-    levels, biases = _levels(count + 1, np.array(pairs), links)
+    levels, biases, covariance = _levels(count + 1, np.array(pairs), links)
     levels = levels[:count] - np.median(levels[:count], axis=0)
     low, high = levels.mean(1).argmin(), levels.mean(1).argmax()
-    changed = np.ptp(levels, axis=0).max() > max(STEADY_LOG, biases[high] - biases[low])
+    unsure = SURE * np.sqrt(covariance[low, low] + covariance[high, high] - 2 * covariance[low, high])
+    changed = np.ptp(levels, axis=0).max() > max(STEADY_LOG, biases[high] - biases[low], unsure)
     return np.exp(-levels) if changed else np.ones((count, 3))
 
 
@@ -138,7 +141,7 @@ def compare(a: Content, b: Content) -> Link | None:
         if person:
             return _agreed(link, _ground_gain(a, b))
         cells = len(np.unique(a.place[first[here]] // CELL_PX, axis=0))
-        return Link(link.gain, max(link.deviation / cells**0.5, ERROR_LOG))
+        return Link(link.gain, max(OF_MEDIAN * link.deviation / cells**0.5, ERROR_LOG))
     return None
 
 
@@ -194,16 +197,16 @@ def _moving_together(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _common(ratio: np.ndarray) -> Link:
-    """Return the median of log ratios [n, 3], and by their brightness's median absolute deviation what it is worth."""
-    brightness = ratio.mean(1)
-    deviation = 1.4826 * np.median(np.abs(brightness - np.median(brightness)))
-    return Link(np.median(ratio, axis=0), max(float(deviation), ERROR_LOG))
+    """Return the median of log ratios [n, 3], and the least sure channel's median absolute deviation from it."""
+    gain = np.median(ratio, axis=0)
+    deviation = 1.4826 * np.median(np.abs(ratio - gain), axis=0)
+    return Link(gain, max(float(deviation.max()), ERROR_LOG))
 
 
-def _levels(count: int, pairs: np.ndarray, links: list[Link]) -> tuple[np.ndarray, np.ndarray]:
+def _levels(count: int, pairs: np.ndarray, links: list[Link]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Solve for the log light of every frame [N, 3] from the links by least squares, robustly (Cauchy's weights).
 
-    Returns also what the links' biases add up to [N], if all are to the side of the change.
+    Returns also what the links' biases add up to [N], if all are to the side of the change, and the covariance [N, N].
     """
     rows = np.arange(len(pairs))
     draw = np.zeros((len(pairs), count))
@@ -215,7 +218,8 @@ def _levels(count: int, pairs: np.ndarray, links: list[Link]) -> tuple[np.ndarra
     trust = np.ones(len(pairs))
     for _ in range(8):
         weighted = draw * (trust / deviations**2)[:, None]
-        solve = np.linalg.inv(draw.T @ weighted + hold) @ weighted.T
+        covariance = np.linalg.inv(draw.T @ weighted + hold)
+        solve = covariance @ weighted.T
         levels = solve @ ratios
         trust = 1 / (1 + (np.abs(draw @ levels - ratios).max(1) / (SURE * deviations)) ** 2)
-    return levels, solve @ (np.array([link.bias for link in links]) * np.sign(draw @ levels.mean(1)))
+    return levels, solve @ (np.array([link.bias for link in links]) * np.sign(draw @ levels.mean(1))), covariance

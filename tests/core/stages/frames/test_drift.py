@@ -133,3 +133,18 @@ def test_metadata_stand_in_for_surface_points_if_every_picture_has_them():
     assert np.log(gains_of(stated)).mean(1) == pytest.approx([0, 0.4, 0], abs=0.01)
     stated[2] = content_of(flat[2])
     assert (gains_of(stated) == 1).all()
+
+
+@pytest.mark.parametrize(("scatter", "told"), [(0.03, True), (0.5, False)])
+def test_a_change_that_a_few_spots_disagree_about_is_none(scatter, told):
+    """Twenty spots of the ground in four cells, darker by 0.3 in the median: of one surface, or taken for it."""
+    rng = np.random.default_rng(2)
+    descriptors = rng.integers(0, 256, (20, 128), np.uint8)
+    place = np.float32([[x, y] for x in (5, 45) for y in (5, 45)] * 5) + rng.uniform(0, 20, (20, 2)).astype(np.float32)
+    first = rng.normal(-1.5, 0.3, (20, 3)).astype(np.float32)
+    change = np.sort(rng.normal(0, scatter, (20, 3)), axis=0)
+    second = first - 0.3 + (change - np.median(change, axis=0)).astype(np.float32)
+    ground, behind = np.zeros(20, bool), np.full((10, 10, 3), np.nan, np.float32)
+    pair = [drift.Content(descriptors, colours, place, ground, behind) for colours in (first, second)]
+    gains = np.log(gains_of(pair))
+    assert (np.ptp(gains, axis=0) == pytest.approx(0.3, abs=0.01)) if told else not gains.any()
