@@ -31,8 +31,10 @@ FRAMES_MM = (
     (23.6, 15.7),
     (22.3, 14.9),
     (20.7, 13.8),
+    (18.7, 14.0),
+    (17.3, 13.0),
+    (13.2, 8.8),
 )
-FRAMES_MM += ((18.7, 14.0), (17.3, 13.0), (13.2, 8.8))
 """Sensors from one inch up: medium formats, 35 mm film, APS-H, APS-C, Canon's APS-C, Foveon, 1.5 inch, four thirds, one
 inch."""
 CANON, NOT_CANON_MM = "canon", 23.6

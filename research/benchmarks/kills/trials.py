@@ -170,9 +170,9 @@ def asleep(trial: KillTrial) -> None:
     trial.where += f", stopped {moment}, awakes {'meanwhile' if meanwhile else 'afterwards'}"
     first = start_job(trial.place, moment, SHORT_TERM_S, **trial.undisturbed.job(stage))
     if first.strike(signal.SIGSTOP):
-        trial.struck += 1
         capture = capture_at(trial.place)
         held = capture.lock.exists()
+        trial.struck += held
         second = fork_worker(capture.job, trial.beside("second"), term_s=SHORT_TERM_S)
         if meanwhile:
             wait_until(lambda: second.pid == _holder(capture.lock) or second.ended(), 10 * SHORT_TERM_S)

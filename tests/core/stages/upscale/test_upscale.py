@@ -179,6 +179,7 @@ def test_the_stage_takes_the_network(capture, busy, monkeypatch):
 
 def test_the_networks_detail_does_not_hang_on_the_tone(capture, busy, monkeypatch):
     monkeypatch.setattr("core.stages.upscale.enlarge.load_network", lambda: busy)
+    monkeypatch.setattr(torch.cpu, "_is_avx512_bf16_supported", lambda: False)  # its rounding is larger than the bound
     gain, small = np.float32([0.3, 0.25, 0.2]), images.read_linear(capture.maps / "diffuse_albedo.exr")
     results = []
     for factor in (np.ones(3, np.float32), gain):
@@ -186,8 +187,7 @@ def test_the_networks_detail_does_not_hang_on_the_tone(capture, busy, monkeypatc
         run(capture, "network")
         results.append(images.read_linear(capture.maps_4k / "diffuse_albedo.png"))
     whole = (results[0] > 0.02) & (results[0] < 0.98)
-    apart = np.abs(results[1] / gain - results[0])[whole]
-    assert whole.mean() > 0.2 and apart.max() < 0.015, "bfloat16 rounds to 0.004"
+    assert whole.mean() > 0.2 and np.abs(results[1] / gain - results[0])[whole].max() < 2e-3
 
 
 @pytest.mark.parametrize("size", [96, 128, 200])
