@@ -66,15 +66,15 @@ def main() -> None:
     options = line.parse_args()
     sittings = list(sit(options.london, options.hdri))
     answers = {"photograph": lambda srgb: srgb, "flat colour": _flat, "whole path": _whole_path}
-    answers["network alone"] = _alone(WEIGHTS)
-    answers |= {path.stem: _alone(path) for path in options.weights}
+    networks = {"network alone": WEIGHTS, **{f"{path.parent.name}/{path.stem} alone": path for path in options.weights}}
+    networks = {name: read_network(DelightNet, path) for name, path in networks.items()}
+    answers |= {name: _alone(net) for name, net in networks.items()}
     record, logs = {}, {}
     for name, answer in answers.items():
         logs[name] = [[_log(answer(srgb)) for srgb in sitting.srgb] for sitting in sittings]
         record[name] = measure(sittings, logs[name])
         print(f"{name:44}", row(record[name]), flush=True)
-    for name, weights in (("network alone", WEIGHTS), *((path.stem, path) for path in options.weights)):
-        net = read_network(DelightNet, weights)
+    for name, net in networks.items():
         if net.answers > 4:
             record[name] |= {"within": measure_sizes(sittings, net)}
             print(f"{name:44}", record[name]["within"])
@@ -149,20 +149,20 @@ def measure_sizes(sittings: list[Sitting], net: DelightNet) -> dict[str, float]:
     """Return the share of the errors of log-luminance within the size that a network states: face, brows, eyes."""
     within = {name: [] for name in ("face", "brows", "eyes")}
     for sitting in sittings:
-        truth = _log(images.linear_to_srgb(sitting.albedo))
-        face = faces.detect(images.linear_to_srgb(sitting.albedo))
-        parts = parser.parse(images.linear_to_srgb(sitting.albedo), face.landmarks) if face else None
+        picture = images.linear_to_srgb(sitting.albedo)
+        truth, face = _log(picture), faces.detect(picture)
+        parts = parser.parse(picture, face.landmarks) if face else None
         for srgb, weight in zip(sitting.srgb, sitting.weight, strict=True):
             look = _look_at(net, srgb)
             error = _centred(_log(divide(srgb, look, 0 * look.shadow)[0]) - truth, weight).mean(-1)
-            inside = np.abs(error) < read_size(look, srgb)
+            inside = np.abs(error) < _stated_size(look, srgb)
             shares = {"face": weight} | ({name: weight * parts.of(name) for name in ("brows", "eyes")} if parts else {})
             for name, share in shares.items():
                 within[name].append((inside * share).sum() / max(share.sum(), 1e-6))
     return {name: round(float(np.mean(values)), 3) for name, values in within.items()}
 
 
-def read_size(look: ShadingEstimate, srgb: np.ndarray) -> np.ndarray:
+def _stated_size(look: ShadingEstimate, srgb: np.ndarray) -> np.ndarray:
     """Return the size [S, S] of the errors that a look states, natural log; 1 off its square."""
     side = round(look.box[2])
     log = np.log(np.maximum(crop(images.srgb_to_linear(srgb), look.box, side), MIN_LINEAR))
@@ -205,9 +205,8 @@ def _whole_path(srgb: np.ndarray) -> np.ndarray:
         return srgb
 
 
-def _alone(weights: Path) -> Callable[[np.ndarray], np.ndarray]:
+def _alone(net: DelightNet) -> Callable[[np.ndarray], np.ndarray]:
     """Return what a network makes of a photograph without a fitted head and without rules."""
-    net = read_network(DelightNet, weights)
 
     def answer(srgb: np.ndarray) -> np.ndarray:
         look = _look_at(net, srgb)
