@@ -40,6 +40,21 @@ def open_sample_head():
     return Path(head()["wildcap_capture"])
 
 
+def open_to_deliver():
+    """The sample head, the solver, and the panel Deliver unfolded at its smallest size; returns the capture's folder."""
+    unfold("WILDCAP_PT_deliver")
+    root = yield from open_sample_head()
+    use_solver()
+    settings().deliver.size = "1024"
+    return root
+
+
+def delivered(root: Path, target: Path):
+    """Wait until the worker has written the maps, on a loaded machine, and the folder is there as a whole."""
+    yield from d.until(lambda: target.is_dir() or problem(root), "the delivery", 600)
+    assert target.is_dir(), problem(root)
+
+
 def drop(folder: Path, *names: str):
     """Files dropped on the tab, by the operator that Blender calls for it: they become one capture."""
     d.act()

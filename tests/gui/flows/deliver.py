@@ -10,16 +10,10 @@ import driver as d
 
 LIMIT_S = 900
 
-DELIVERY_LIMIT_S = 600
-"""For the worker to write four maps, on a loaded machine."""
-
 
 def flow():
-    addon.unfold("WILDCAP_PT_deliver")
-    root = yield from addon.open_sample_head()
-    addon.use_solver()
+    root = yield from addon.open_to_deliver()
     addon.settings().deliver.preset = "unreal"
-    addon.settings().deliver.size = "1024"
     yield 1.0
     d.screenshot("deliver_1_panel")
     target = root / "exports" / f"{root.stem}_head_unreal_fbx"
@@ -27,8 +21,7 @@ def flow():
     yield 1.0
     d.screenshot("deliver_2_question")
     yield from d.key('RET')
-    yield from d.until(lambda: target.is_dir() or addon.problem(root), "the delivery", DELIVERY_LIMIT_S)
-    assert target.is_dir(), addon.problem(root)
+    yield from addon.delivered(root, target)
     told = json.loads((target / "provenance.json").read_text(encoding="utf-8"))
     files = set(told["files"])
     assert told["versions"]["Blender"] and {f"{root.stem}.fbx", f"textures/T_{root.stem}_N.png"} <= files, files

@@ -12,15 +12,9 @@ import numpy as np
 
 LIMIT_S = 900
 
-DELIVERY_LIMIT_S = 600
-"""For the worker to write the maps, on a loaded machine."""
-
 
 def flow():
-    addon.unfold("WILDCAP_PT_deliver")
-    root = yield from addon.open_sample_head()
-    addon.use_solver()
-    addon.settings().deliver.size = "1024"
+    root = yield from addon.open_to_deliver()
     addon.settings().deliver.format = "obj"
     bpy.ops.wildcap.assemble_material('EXEC_DEFAULT', True)
     yield 1.0
@@ -49,8 +43,7 @@ def ships(root, chosen):
     yield from d.press("wildcap.deliver")
     yield 1.0
     yield from d.key('RET')
-    yield from d.until(lambda: target.is_dir() or addon.problem(root), "the delivery", DELIVERY_LIMIT_S)
-    assert target.is_dir(), addon.problem(root)
+    yield from addon.delivered(root, target)
     told = json.loads((target / "provenance.json").read_text(encoding="utf-8"))["skin_tone"]
     assert np.allclose(told["chosen_srgb"], chosen, atol=1e-3), told
     solved, delivered = (
