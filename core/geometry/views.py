@@ -52,8 +52,15 @@ class View:
         return self.rotation[2]
 
     def read(self) -> np.ndarray:
-        """Return the picture, sRGB [H, W, 3]. Raises Problem if it cannot be read."""
-        return images.read_srgb(self.path)
+        """Return the picture, sRGB [H, W, 3]. Raises Problem if it cannot be read, or is not the camera's size."""
+        picture = images.read_srgb(self.path)
+        height, width = picture.shape[:2]
+        if (width, height) != (self.width, self.height):
+            raise Problem(
+                f"{self.path} is {width} x {height}, but its camera was solved for {self.width} x {self.height}.",
+                advise_again("frames"),
+            )
+        return picture
 
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Project world points [N, 3] to pixels [N, 2] and depths [N] in metres.

@@ -14,6 +14,7 @@ pycolmap = pytest.importorskip("pycolmap")
 from core.capture.capture import Capture  # noqa: E402
 from core.geometry.models import read_model  # noqa: E402
 from core.geometry.views import read_views  # noqa: E402
+from core.imaging import images  # noqa: E402
 from tests.fixtures.refused import refused  # noqa: E402
 
 
@@ -38,6 +39,13 @@ def write_model(capture: Capture, name: str, text: bool = False) -> None:
     )
     model.add_point3D(np.zeros(3), pycolmap.Track(), np.zeros(3, np.uint8))
     (model.write_text if text else model.write)(str(capture.cameras))
+
+
+@pytest.mark.parametrize(("height", "width"), [(7, 300), (960, 719)])
+def test_a_frame_that_has_another_size_than_its_camera_is_refused_by_name(capture, height, width):
+    images.write_srgb(capture.frames / "00000.jpg", np.full((height, width, 3), 0.5, np.float32))
+    (view,) = read_views(capture)
+    refused(view.read, "00000.jpg", f"is {width} x {height}", "solved for 720 x 960", "Frames again")
 
 
 def test_sound_models_are_read(capture):
