@@ -9,6 +9,7 @@ stays as it is until the artist runs it again.
 
 from __future__ import annotations
 
+import os
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
@@ -85,7 +86,7 @@ def _hash_inputs(root: Path, record: dict, stage: Stage, settings: Settings) -> 
 def _changed_inputs(recorded: dict, root: Path, record: dict, stage: Stage, settings: Settings) -> list[str]:
     present = _hash_inputs(root, record, stage, settings)
     places = result_paths(getattr(settings, stage.name))
-    gone = {f"{stage.name}.{name}" for name, path in places.items() if not Path(path).exists()}
+    gone = {f"{stage.name}.{name}" for name, path in places.items() if not os.path.exists(path)}
     changed = [name for name in present.keys() & recorded.keys() - gone - {SOURCE} if present[name] != recorded[name]]
     # a setting that was emptied, or names a place since
     changed += [name for name in present.keys() ^ recorded.keys() if name.startswith(f"{stage.name}.")]

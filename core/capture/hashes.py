@@ -55,13 +55,13 @@ def sample_file(path: Path) -> str:
 
 def hash_tree(path: Path, hash_one: Callable[[Path], str] = hash_file) -> str | dict:
     """Return the hash of a file, {relative name: hash} of a folder, or ''. Hidden files and LITTER do not count."""
-    if path.is_dir():
+    if os.path.isdir(path):  # Path's own raises an error for a name that is too long
         return {
             p.relative_to(path).as_posix(): hash_one(p)
             for p in sorted(path.rglob("*"))
             if p.is_file() and not p.name.startswith(".") and p.name.lower() not in LITTER
         }
-    return hash_one(path) if path.is_file() else ""
+    return hash_one(path) if os.path.isfile(path) else ""
 
 
 def hash_source(source: Path | None) -> list:

@@ -14,6 +14,9 @@ from ..capture.together import captures_in
 from .setting_values import PATHS
 from .settings import Settings
 
+LONGEST_SHOWN = 300
+"""Characters of a path that a message shows."""
+
 
 def check_paths(settings: Settings, stages: Iterable[str]) -> None:
     """Raise Problem if a file or folder that one of these stages needs is not set, missing, or lacks files."""
@@ -33,9 +36,9 @@ def _check(name: str, field: Field, value: str) -> None:
             raise Problem(f"{setting} is empty.", advice)
         return
     path = Path(os.path.expanduser(value))
-    if not path.exists():
+    if not os.path.exists(path):  # Path.exists raises an error for a name that is too long
         raise Problem(
-            f"There is no file or folder at {path}, the value of {setting}.",
+            f"There is no file or folder at {str(path)[:LONGEST_SHOWN]}, the value of {setting}.",
             "Check its name, and that its disk is connected.",
         )
     if (about["path"] == "folder" and not path.is_dir()) or (about["path"] == "file" and not path.is_file()):

@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Files and folders that settings name: those that a stage needs have to be there, others do not count."""
 
+from pathlib import Path
+
 import pytest
 
+from core.capture.hashes import hash_tree
 from core.capture.stages import NAMES
 from core.settings.setting_paths import check_paths
 from core.settings.settings import from_json
@@ -31,6 +34,12 @@ def check(stage: str, **values) -> None:
 )
 def test_what_is_needed_and_missing_is_named(stage, values):
     refuses(f"{stage}.{list(values)[-1] if 'gone' in values.values() else ''}", check, stage, **values)
+
+
+def test_a_name_that_no_disk_can_hold_is_missing_like_any_other(tmp_path):
+    name = str(tmp_path / ("1" * 300))
+    refuses("registration.template", check, "registration", template=name)
+    assert hash_tree(Path(name)) == ""
 
 
 def test_what_is_not_used_may_be_missing():
