@@ -109,7 +109,7 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     whole, index = surfaces.welded(own.mesh)
     first = np.full(len(whole.vertices), -1)
     first[index[::-1]] = np.arange(len(index))[::-1]  # one original vertex of each welded one
-    pose, landmarks, pictures = render_landmarks.find(_outwards(whole), report)
+    pose, landmarks, pictures = render_landmarks.find(_outwards(whole), own.path.name, report)
     whole = _outwards(whole.moved(render_landmarks.to_ours(whole.vertices, pose)))
     shapes = (own.shapes[:, first] @ pose.turn.T.astype(np.float32)) * np.float32(render_landmarks.FACE_M / pose.width)
 

@@ -49,12 +49,12 @@ class Pose:
     width: float
 
 
-def find(mesh: Mesh, report: Reporter) -> tuple[Pose, Landmarks, list[np.ndarray]]:
+def find(mesh: Mesh, name: str, report: Reporter) -> tuple[Pose, Landmarks, list[np.ndarray]]:
     """Find the pose of the face, its landmarks as `to_ours` places them, and the sRGB pictures they were found in.
 
-    Raises Problem where no face is found.
+    `name` is that of the mesh's file. Raises Problem where no face is found.
     """
-    pose = _find_pose(mesh, report)
+    pose = _find_pose(mesh, name, report)
     posed = mesh.moved(to_ours(mesh.vertices, pose))
     colours, landmarks, pictures = np.tile(SKIN, (len(mesh.vertices), 1)), None, []
     caster, normals = raster.RayCaster(posed), vertex_normals(posed)
@@ -73,7 +73,7 @@ def find(mesh: Mesh, report: Reporter) -> tuple[Pose, Landmarks, list[np.ndarray
             if len(views) > 0.6 * len(sides):
                 break
         else:
-            raise _no_face()
+            raise _no_face(name)
         landmarks = onto_surface(triangulate(views, np.stack(pixels)), views, posed)
         colours = _paint(posed, landmarks.points)
     return pose, landmarks, pictures
@@ -84,7 +84,7 @@ def to_ours(points: np.ndarray, pose: Pose) -> np.ndarray:
     return (points - pose.face) @ pose.turn.T * (FACE_M / pose.width)
 
 
-def _find_pose(mesh: Mesh, report: Reporter) -> Pose:
+def _find_pose(mesh: Mesh, name: str, report: Reporter) -> Pose:
     """Find the pose in which the mesh shows the most certain upright face from the front."""
     used = mesh.vertices[np.unique(mesh.faces)]
     middle, size = (used.min(0) + used.max(0)) / 2, np.ptp(used, axis=0).max()
@@ -110,7 +110,7 @@ def _find_pose(mesh: Mesh, report: Reporter) -> Pose:
             if best[0] > SURE_SCORE:
                 return placed(best[1])
     if best[1] is None:
-        raise _no_face()
+        raise _no_face(name)
     return placed(best[1])
 
 
@@ -223,8 +223,8 @@ def _paint(mesh: Mesh, points: np.ndarray) -> np.ndarray:
     return colours
 
 
-def _no_face() -> Problem:
+def _no_face(name: str) -> Problem:
     return Problem(
-        "No face was found on your head mesh from any side.",
+        f"No face was found on your head mesh {name} from any side.",
         "Choose an OBJ of a head in a neutral pose, without hair or glasses, or use only the built-in head.",
     )

@@ -142,7 +142,8 @@ def test_a_folder_needs_one_neutral_and_shapes_of_it(tmp_path):
 def test_a_mesh_without_a_face_is_refused(monkeypatch):
     monkeypatch.setattr(render_landmarks, "_turns", lambda: [np.eye(3)])
     ball = trimesh.creation.icosphere(4, 1.0)
-    refused(lambda: render_landmarks.find(meshes.Mesh(ball.vertices, ball.faces), Reporter("x")), "No face was found")
+    mesh = meshes.Mesh(ball.vertices, ball.faces)
+    refused(lambda: render_landmarks.find(mesh, "ball.obj", Reporter("x")), "No face was found", "ball.obj")
 
 
 def test_parts_without_a_counterpart_follow_the_skin_around_them():
@@ -161,5 +162,5 @@ def test_parts_without_a_counterpart_follow_the_skin_around_them():
 def test_it_is_found_however_it_lies():
     turn = render_landmarks._turns()[7]
     mesh = template.load()
-    pose = render_landmarks._find_pose(mesh.moved(mesh.vertices @ turn * 37 + [500, -3, 20]), Reporter("x"))
+    pose = render_landmarks._find_pose(mesh.moved(mesh.vertices @ turn * 37 + [500, -3, 20]), "head.obj", Reporter("x"))
     assert np.allclose(pose.turn, turn)
