@@ -111,6 +111,8 @@ def _landmarks(options: argparse.Namespace) -> int:
         raise Problem(f"There is no file at {options.file}.", "Check its name.")
     position = (options.x, options.y, options.z) if "x" in options else None
     points = artist_landmarks.read(options.file) if "file" in options else {options.index: position}
+    if not points:
+        raise Problem(f"{options.file} contains no landmark.", "Give at least one, or free single ones by their index.")
     count = len(artist_landmarks.put(Capture(options.capture), points))
     print(f"{count} landmark{'' if count == 1 else 's'} put by hand; the stage registration comes next.")
     return 0

@@ -47,6 +47,8 @@ def test_set_import_and_free(capture, tmp_path, capsys):
 )
 def test_a_bad_file_is_a_problem_and_changes_nothing(capture, tmp_path, text):
     bad = tmp_path / "bad.json"
+    bad.write_text('{"points": {}}')
+    assert main(["landmarks", "import", str(capture.root), str(bad)]) == 2
     bad.write_text(text)
     with pytest.raises(Problem):
         artist_landmarks.read(bad)
