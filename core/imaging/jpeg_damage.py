@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 LEAST_JUMP = 1.5 / 255
@@ -33,6 +34,9 @@ SEAM_ROWS = 40
 LEAST_BLOCKS = 8
 BORDER = 3
 """Blocks at either end of a row where an edge is hardly one of two rows."""
+FINE_PX, CLIPPED, LEAST_OPEN, LIKE = 31, 0.02, 0.1, 0.5
+"""Detail of a row is finer than so many pixels; how near to black and white it tells nothing, the share of a row that
+has to tell something, and the correlation of two rows that show the same."""
 FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 """Markers of a frame's header (ITU-T T.81, table B.1)."""
 SEQUENTIAL, TABLES, SCAN = {0xC0, 0xC1}, 0xC4, 0xDA
@@ -91,7 +95,26 @@ def edge_share(pixels: np.ndarray, path: Path) -> float:
     # from one place on in a row, up to there in the next: a frame's edge is in one row alone
     right, left = (after[:-1] - after[1:])[:, place], (before[1:] - before[:-1])[:, place]
     shares = np.minimum(np.minimum(right / (count - place), left / place), (right + left) / count)
-    return float(shares.max(initial=0))
+    whole = (after[:-1] - after[1:])[:, 0] / count
+    along = [
+        whole[row]
+        for row in np.flatnonzero(whole > LEAST_SHARE)
+        if _goes_on(pixels[:, : count * width], (row + 1) * height, np.repeat(high[row], width))
+    ]
+    return float(max(shares.max(initial=0), max(along, default=0)))
+
+
+def _goes_on(pixels: np.ndarray, row: int, jumps: np.ndarray) -> bool:
+    """Return whether what a row of pixels shows goes on in the one above it, but for its brightness, where that jumps.
+
+    So it does below an edge of damage that begins at a row's end; beyond one of a frame or a horizon it is another.
+    """
+    lines = pixels[row - 1 : row + 1].mean(-1)
+    fine = lines - cv2.blur(lines, (FINE_PX, 1))
+    open_ = jumps & (np.abs(lines - 0.5) < 0.5 - CLIPPED).all(0)  # by the shift, others are white or black
+    if open_.mean() < LEAST_OPEN or fine[:, open_].std(1).min() < LEAST_JUMP:
+        return False
+    return bool(np.corrcoef(fine[:, open_])[0, 1] > LIKE)
 
 
 def block_size(path: Path) -> tuple[int, int]:

@@ -5,6 +5,7 @@
 import io
 import random
 
+import cv2
 import numpy as np
 import pytest
 from skimage import data
@@ -93,3 +94,17 @@ def test_the_size_of_a_block_is_the_headers(tmp_path, sampling, size):
     assert jpeg_damage.block_size(tmp_path / "a.jpg") == size
     (tmp_path / "a.jpg").write_bytes(b"\xff\xd8\xff")
     assert jpeg_damage.block_size(tmp_path / "a.jpg") == (8, 8)
+
+
+def test_a_shift_that_begins_with_a_row_is_noticed_and_an_edge_between_two_pictures_is_not(tmp_path):
+    rng = np.random.default_rng(3)
+    texture = cv2.GaussianBlur(rng.normal(0, 1, (320, 240)).astype(np.float32), (0, 0), 2)
+    upper = np.repeat((0.45 + 0.4 * texture)[..., None], 3, 2)
+    shifted, other = upper.copy(), upper.copy()
+    shifted[160:] += 0.1
+    other[160:] = 0.1 + np.roll(upper, 97, axis=1)[160:]
+    found = []
+    for picture in (upper, shifted, other):
+        images.write_srgb(tmp_path / "a.jpg", picture.clip(0, 1), quality=95)
+        found.append(jpeg_damage.is_damaged(images.read_srgb(tmp_path / "a.jpg"), tmp_path / "a.jpg"))
+    assert found == [False, True, False]
