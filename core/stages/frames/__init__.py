@@ -88,7 +88,7 @@ def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[FrameR
         face, rival = _subject(picture.srgb, last if picture.time_s is not None else None)
         last = face or last
         records.append(_record(picture, name, face, last, rival))
-        thumbnails.append(images.resize(picture.srgb.mean(-1), 32, 32))
+        thumbnails.append(images.resize(picture.srgb, 32, 32).mean(-1))
         contents.append(content_of(picture.srgb, picture.exposure))
         if not picture.source:
             details.append(features_of(picture.srgb))
