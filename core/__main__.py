@@ -24,7 +24,15 @@ from .capture import consent, delivery_plan, stages, unforeseen
 from .capture.capture import Capture
 from .capture.messages import Problem, Reporter
 from .settings import delighter_cards, delivery_presets, settings
-from .worker import capture_commands, command_settings, read_only, self_test, setup_commands, terminal
+from .worker import (
+    capture_commands,
+    command_settings,
+    read_only,
+    retouch_commands,
+    self_test,
+    setup_commands,
+    terminal,
+)
 from .worker.commands import add_command, path_of
 from .worker.job import last_settings, wait_until_free, write_job
 from .worker.output import OutputLost, let_go, open_streams
@@ -89,6 +97,7 @@ def _parser() -> argparse.ArgumentParser:
     command_settings.add_options(deliver, "deliver")
     _add_lists(commands)
     capture_commands.add_commands(commands)
+    retouch_commands.add_commands(commands)
     _add_white(commands)
     add_command(commands, "doctor", _doctor, "say what is installed, what is missing and what to do")
     test = add_command(commands, "self-test", _self_test, "solve the sample head again on this machine, and compare it")

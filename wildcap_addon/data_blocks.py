@@ -17,18 +17,19 @@ def read_field(collection, field: str, width: int = 1, kind=np.float32) -> np.nd
     return values
 
 
-def read_pixels(image: bpy.types.Image) -> np.ndarray:
-    """Return an image's pixels, float32 [H, W, C], the lowest row first."""
-    width, height = image.size
-    pixels = np.empty((height, width, image.channels), np.float32)
+def read_pixels(image: bpy.types.Image, into: np.ndarray | None = None) -> np.ndarray:
+    """Return an image's pixels, float32 [H, W, C], the lowest row first; in `into` if that has the shape."""
+    shape = image.size[1], image.size[0], image.channels
+    pixels = into if into is not None and into.shape == shape else np.empty(shape, np.float32)
     image.pixels.foreach_get(pixels.ravel())
     return pixels
 
 
 def load_pixels(path: Path) -> np.ndarray:
-    """Return a file's pixels as they are stored there."""
+    """Return a file's pixels as they are stored there, alpha beside the colours."""
     image = bpy.data.images.load(str(path))
     image.colorspace_settings.is_data = True
+    image.alpha_mode = 'CHANNEL_PACKED'  # or Blender multiplies the colours of 16 bits by it
     pixels = read_pixels(image)
     bpy.data.images.remove(image)
     return pixels

@@ -22,7 +22,7 @@ class Facts:
     has_capture: bool = False
     has_python: bool = False
     running: str = ""  # kind of the capture's job, a key of WORDS; '' for none
-    painting: bool = False
+    painting: str = ""  # what is painted: SHADOW, PROTECT or LAYER; '' for nothing
     head_time: float = -1.0  # modification time of the head.obj in the scene; -1: none
     maps_time: float = -1.0  # of the material's maps; -1: none assembled
     status: Status | None = None
@@ -48,6 +48,12 @@ ASK = NextStep(
 PAINTING = NextStep(
     "Red is shadow, green is protected. Paint adds, Ctrl takes away.",
     "Save Mask and Leave",
+    "wildcap.finish_mask",
+    'CHECKMARK',
+)
+PAINTING_LAYER = NextStep(
+    "What you paint lies over the map, which stays. Heal replaces it by skin.",
+    "Save Layer and Leave",
     "wildcap.finish_mask",
     'CHECKMARK',
 )
@@ -77,7 +83,7 @@ def next_step(facts: Facts, translated: Callable[[str], str] = str) -> NextStep:
     Stale stages before the mask do not lead back to Reconstruct; their rows show it.
     """
     if facts.painting:
-        return PAINTING
+        return PAINTING_LAYER if facts.painting == 'LAYER' else PAINTING
     if facts.running == "batch":
         return NextStep(WORDS["batch"], "Cancel Batch", "wildcap.cancel_batch", 'CANCEL')
     if facts.running:

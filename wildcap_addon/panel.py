@@ -69,6 +69,8 @@ class WILDCAP_PT_stages(CapturePanel, bpy.types.Panel):
         # whether the first stage that is to do gets a button
         ready = bool(capture_status and (capture_status.source or capture_status.has_head))
         for stage in stages.STAGES:
+            if stage.only_with and not len(item.layers):
+                continue
             state = "running" if job and job.stage == stage.name else _state(capture_status, stage.name)
             split = column.split(factor=0.47)
             split.label(text=stage.label, icon=STATE_ICONS[state])
@@ -123,7 +125,7 @@ def gather(context, item) -> next_step.Facts:
         has_capture=True,
         has_python=has_python,
         running=running,
-        painting=session.active(),
+        painting=session.painted_kind(),
         head_time=head.get("wildcap_head_time", 0.0) if head else -1.0,
         maps_time=head.get("wildcap_maps_time", -1.0) if head else -1.0,
         asks_tone=tones.asks(item),

@@ -10,12 +10,12 @@ from dataclasses import fields
 
 import bpy
 
-from ..core.capture import stages
+from ..core.capture import retouch_layers, stages
 from ..core.settings import delighter_cards, delivery_presets, skin_swatches
 from ..core.settings import settings as core_settings
 from ..core.settings.setting_values import absolute_path
 from ..core.settings.settings import STAGE_KINDS
-from . import captures, preferences, tones
+from . import captures, layers, preferences, tones
 from . import hdri as worlds
 
 SUBTYPES = {"file": 'FILE_PATH', "file_or_folder": 'FILE_PATH', "folder": 'DIR_PATH'}
@@ -77,6 +77,38 @@ def _hand_on_tone(self, context):
     tones.hand_on(self)
 
 
+def _hand_on_layer(self, context):
+    for item in captures.listed():
+        if any(row == self for row in item.layers):
+            layers.hand_on(self, item)
+
+
+class WILDCAP_PG_layer(bpy.types.PropertyGroup):
+    """Row of an artist's layer; `name` is its name."""
+
+    name: bpy.props.StringProperty(name="Name", maxlen=retouch_layers.LONGEST_NAME, update=_hand_on_layer)
+    file: bpy.props.StringProperty(name="File", options={'HIDDEN'}, description="Its file in the capture")
+    map: bpy.props.StringProperty(name="Map", options={'HIDDEN'}, description="The map that it lies over")
+    visible: bpy.props.BoolProperty(
+        name="Visible", default=True, update=_hand_on_layer, description="Lay this layer over the maps"
+    )
+    opacity: bpy.props.FloatProperty(
+        name="Opacity",
+        subtype='FACTOR',
+        min=0,
+        max=1,
+        default=1,
+        update=_hand_on_layer,
+        description="How far the layer covers what is below",
+    )
+    locked: bpy.props.BoolProperty(
+        name="Keep Colours",
+        default=False,
+        update=_hand_on_layer,
+        description="Keep its colours when the skin tone changes, as of make-up or a tattoo; off: they follow the tone",
+    )
+
+
 class WILDCAP_PG_capture(bpy.types.PropertyGroup):
     """Item of the scene's list: one capture folder."""
 
@@ -108,6 +140,8 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
             ("mps", "Metal", ""),
         ],
     )
+    layers: bpy.props.CollectionProperty(type=WILDCAP_PG_layer)
+    active_layer: bpy.props.IntProperty(name="Layer", description="The layer that is painted next")
     seed: bpy.props.IntProperty(name="Seed", min=0, default=0, description=SHARED_TOOLTIPS["seed"])
     use_skin_tone: bpy.props.BoolProperty(
         name="Set Skin Tone",
@@ -222,6 +256,13 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
     tint_strength: bpy.props.FloatProperty(
         name="Tint Strength", min=0.05, max=1, default=0.45, description="Opacity of a mask over the texture"
     )
+    layer_side: bpy.props.EnumProperty(
+        name="Layer Size",
+        default="2048",
+        description="Texels of a side of the layer that is painted. A smaller one keeps the finer detail of the 4K "
+        "maps below it; 4K needs some 2 GB of memory",
+        items=[("1024", "1K", "1024 texels, as solved"), ("2048", "2K", "2048 texels"), ("4096", "4K", "4096 texels")],
+    )
     resolution: bpy.props.IntProperty(
         name="Resolution", subtype='PIXEL', min=16, max=8192, default=1024, description="Side of the rendered picture"
     )
@@ -303,7 +344,9 @@ def settings(item: WILDCAP_PG_capture) -> core_settings.Settings:
     return core_settings.from_json(job_settings(item))
 
 
-_register, _unregister = bpy.utils.register_classes_factory((*GROUPS.values(), WILDCAP_PG_capture, WILDCAP_PG_scene))
+_register, _unregister = bpy.utils.register_classes_factory(
+    (*GROUPS.values(), WILDCAP_PG_layer, WILDCAP_PG_capture, WILDCAP_PG_scene)
+)
 
 
 def register():

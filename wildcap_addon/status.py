@@ -15,7 +15,7 @@ import bpy
 from ..core.capture import consent, freshness, mask_edit, newest_maps, report, stages
 from ..core.capture.capture import Capture
 from ..core.capture.messages import Problem
-from . import captures, properties, tones, undo
+from . import captures, layers, properties, tones, undo
 from .batch_watch import modified_ns
 
 INTERVAL_S = 1.0  # between two looks at the capture's folder
@@ -41,6 +41,7 @@ class Status:
     render: str = ""
     whole_solve: str = ""  # why an edited part of the mask cannot be solved alone; '' if it can
     interrupted: bool = False  # a solve stopped early and can continue from its checkpoint
+    layers_changed: dict = field(default_factory=dict)  # file of a layer -> by how much the skin below changed, delta E
     torch_percent: int | None = None  # of the light, where the frames were delit as lit by a torch
     findings: tuple[dict, ...] = ()  # problems of the capture, from core.capture.report.findings
     problem: Problem | None = None
@@ -69,6 +70,7 @@ def refresh(context) -> None:
         root = captures.root(item)
         if root in _wanted or item == active:
             tones.take_in(item)
+            layers.take_in(item)
             capture = captures.folder(item)
             stamp = _stamp(capture, repr(properties.job_settings(item)))
             if root not in _known or _known[root][0] != stamp:
@@ -110,6 +112,7 @@ def look(capture: Capture, settings) -> Status:
         head_time=_time(capture.head),
         has_mask=capture.shadow_mask.is_file(),
         torch_percent=delit.get("torch_share_percent") if delit.get("delighter") == "torch" else None,
+        layers_changed=record["stages"].get("retouch", {}).get("figures", {}).get("retouch_changed", {}),
         findings=tuple(report.findings(record)),
         interrupted=_interrupted(capture),
         has_maps=all(path.is_file() for path in maps),
@@ -124,7 +127,7 @@ def _unreadable(capture: Capture, reason, remedy: str) -> Problem:
 
 
 def _verdict(capture: Capture, stage: stages.Stage, record: dict, settings) -> freshness.Verdict:
-    if stage.name in record["stages"]:
+    if stage.name in record["stages"] or stage.only_with:
         return capture.verdict(stage, settings)
     # a stage that began and did not end leaves outputs of another run, or incomplete ones
     has_begun = (capture.logs / f"{stage.name}.log").is_file()
@@ -166,11 +169,17 @@ def _stamp(capture: Capture, settings: str) -> tuple:
         capture.protect_mask,
         capture.texture,
         capture.solved,
+        capture.retouch,
+        capture.retouch_layers,
         capture.checkpoints,
         capture.frames_json,
         capture.consent,
         capture.switchlight,
-        *(folder / name for folder in (capture.maps, capture.maps_4k) for name in newest_maps.WORN),
+        *(
+            folder / name
+            for folder in (capture.maps, capture.maps_4k, capture.maps_retouched)
+            for name in newest_maps.WORN
+        ),
         capture.renders,
     )
     return settings, *map(modified_ns, watched)
@@ -187,6 +196,7 @@ def _tick() -> float:
         root = captures.root(item)
         if root not in _wanted or root in _looking:
             continue
+        layers.take_in(item)
         if tones.take_in(item):
             undo.push("Skin Tone")
         _looking.add(root)

@@ -27,6 +27,8 @@ NAME = "toned.bmp"
 ALBEDO = "diffuse_albedo.png"
 MASKS = Path(__file__).resolve().parents[1] / "core" / "assets" / "masks"
 SKIN_SHARE = 0.9
+MOST_SIDE = 2048
+"""Side of the picture, in texels: one of 4096 takes a second to write."""
 LEVELS = 16
 """Steps of the weight of skin in the picture."""
 
@@ -101,16 +103,27 @@ def weight_pixels(capture: Capture, source: Path) -> np.ndarray:
     It is the solve's own; for an older one it is made by the template's brows and the masks of hair in 4K, as
     core/face/skin_weight.py makes it for deliveries.
     """
-    if capture.skin_weight.is_file() and source.parent == capture.maps:
-        return _load(capture.skin_weight)[..., 0]
+    own = source.with_name(capture.skin_weight.name)
+    if own.is_file() and source.parent in (capture.maps, capture.maps_retouched):
+        return _load(own)[..., 0]
     albedo = colours.srgb_to_linear(_load(source)[..., :3])
     size = len(albedo)
-    zone = np.maximum.reduce([_sampled(_mask(name), size) for name in NO_SKIN])
+    zone = _usual_zone(size)
     for path in (capture.maps_4k / name for name in HAIR_MASKS):
         if path.is_file() and source.parent == capture.maps:
             zone = np.maximum(zone, _sampled(_load(path)[..., 0], size) / HAIR_ZONE)
     weight = weigh_hair(albedo, zone.clip(0, 1), _mean_of_skin(albedo))
     return weight * (1 - (1 - LIPS_TONE) * _sampled(_mask("lips"), size))
+
+
+def weigh_layer(albedo: np.ndarray, tone: np.ndarray) -> np.ndarray:
+    """Return how far each texel of an artist's layer, linear [S, S, 3] over skin of a linear tone [3], follows it."""
+    return weigh_hair(albedo, _usual_zone(len(albedo)), tone)
+
+
+def _usual_zone(size: int) -> np.ndarray:
+    """Return where faces have hair that is no beard [size, size], by the template."""
+    return np.maximum.reduce([_sampled(_mask(name), size) for name in NO_SKIN])
 
 
 def weight_image(name: str, capture: Capture) -> bpy.types.Image:
@@ -126,8 +139,13 @@ def weight_image(name: str, capture: Capture) -> bpy.types.Image:
 
 @lru_cache(maxsize=2)  # while the artist tries tones
 def _read(capture: Capture, source: Path, time_ns: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return a picture as bytes [S, S, 3], and the weight of its skin in LEVELS [S, S]; the lowest row first."""
-    stored = np.round(255 * _load(source)[..., :3]).clip(0, 255).astype(np.uint8)
+    """Return a picture as bytes [S, S, 3], and the weight of its skin in LEVELS [S, S]; the lowest row first.
+
+    Of a larger one than MOST_SIDE every second texel or fewer are taken.
+    """
+    pixels = _load(source)[..., :3]
+    step = max(1, len(pixels) // MOST_SIDE)
+    stored = np.round(255 * pixels[::step, ::step]).clip(0, 255).astype(np.uint8)
     weight = _sampled(weight_pixels(capture, source), len(stored))
     return stored, np.round((LEVELS - 1) * weight).astype(np.uint8)
 

@@ -68,6 +68,9 @@ class Capture:
         self.irises = self.maps / "irises.json"  # absent if the eyes were closed
         self.skin_weight = self.maps / "skin_weight.png"  # what follows the skin tone; absent from older solves
         self.maps_4k = self.root / "maps_4k"
+        self.retouch = self.root / "retouch"  # the artist's layers
+        self.retouch_layers = self.retouch / "layers.json"  # absent if there never was one
+        self.maps_retouched = self.root / "maps_retouched"  # maps_4k with them; absent without layers
         self.delivery = self.root / "delivery"
         self.exports = self.root / "exports"  # default folder of deliveries
         self.comparison = self.root / "comparison"
@@ -197,9 +200,10 @@ class Capture:
 
     def verdict(self, stage: stages.Stage, settings: Settings) -> Verdict:
         """Judge whether a stage is to do, done, stale or made by older code, and why."""
-        if not all(self.has(name) for name in stage.writes):
+        record = self.read()
+        if freshness.has_work(self.root, record, stage) and not all(self.has(name) for name in stage.writes):
             return Verdict(freshness.TO_DO)
-        return freshness.judge_stage(self.root, self.read(), stage, settings)
+        return freshness.judge_stage(self.root, record, stage, settings)
 
     def state(self, stage: stages.Stage, settings: Settings) -> str:
         """Return the `verdict`'s state alone."""

@@ -42,6 +42,8 @@ GROUPS = {
     "mask_history": "Painted masks",
     "maps": "Maps",
     "maps_4k": "Maps",
+    "maps_retouched": "Maps",
+    "retouch": "Retouch layers",
     "renders": "Renders",
     "delivery": "Exports",
     "exports": "Exports",

@@ -167,6 +167,18 @@ def remove_file(path: Path) -> None:
                 path.unlink()
 
 
+def remove_folder(path: Path) -> None:
+    """Remove a folder of a capture if it exists; foreign files in it stay, changed ones are kept aside."""
+    root = ownership.root_of(path)
+    written = ownership.read_record(root)[0] if root is not None else {}
+    for file in ownership.files_in(path) if path.is_dir() else ():
+        if root is None or ownership.path_inside(root, file) in written:
+            remove_file(file)
+    with storage_problems(path):
+        if path.is_dir():
+            ownership.remove_empty_folders(path)
+
+
 @contextlib.contextmanager
 def storage_problems(path: Path):
     """Raise an OSError of the block as the Problem of writing `path`."""

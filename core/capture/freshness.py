@@ -17,7 +17,8 @@ from ..settings.settings import Settings, result_paths, result_settings
 from .code_key import code_key
 from .hashes import hash_source, hash_tree, hash_value, same_source, sample_file
 from .portable_paths import read_portable
-from .stages import Stage
+from .retouch_layers import hash_shown
+from .stages import RETOUCH, RETOUCHED, Stage
 from .together import hash_inputs
 
 TO_DO, DONE, STALE, OLDER = "to do", "done", "stale", "older"
@@ -50,10 +51,10 @@ def describe_conditions(root: Path, record: dict, stage: Stage, settings: Settin
 
 
 def judge_stage(root: Path, record: dict, stage: Stage, settings: Settings) -> Verdict:
-    """Judge a stage whose outputs exist."""
+    """Judge a stage by its record, whether or not its outputs exist."""
     finished = record["stages"].get(stage.name)
     if finished is None:
-        return Verdict(TO_DO)
+        return Verdict(TO_DO if has_work(root, record, stage) else DONE)
     changed = [
         *_changed_inputs(finished["inputs"], root, record, stage, settings),
         *_changed_settings(finished, stage, settings),
@@ -63,6 +64,14 @@ def judge_stage(root: Path, record: dict, stage: Stage, settings: Settings) -> V
     else:
         state = DONE if finished["code"] == code_key(stage.module) else OLDER
     return Verdict(state, tuple(changed), finished["version"])
+
+
+def has_work(root: Path, record: dict, stage: Stage) -> bool:
+    """Return whether a stage has something to do: without the input that it works on, only to take back what it did."""
+    if not stage.only_with or _hash_input(root, stage.only_with):
+        return True
+    did = record["stages"].get(stage.name, {}).get("inputs", {}).get(stage.only_with)
+    return bool(did) or any((root / name).exists() for name in stage.writes)
 
 
 def source_of(root: Path, record: dict) -> Path | None:
@@ -75,12 +84,17 @@ def _hash_inputs(root: Path, record: dict, stage: Stage, settings: Settings) -> 
     names = [*stage.reads, *stage.optional_reads]
     if stage.name == "solve" and settings.solve.prior:
         names += ["own_head.obj", "own_head.json"]
-    hashes = {name: hash_tree(root / name) for name in names}
+    hashes = {name: _hash_input(root, name) for name in names}
     for name, path in result_paths(getattr(settings, stage.name)).items():
         hashes[f"{stage.name}.{name}"] = hash_inputs(path) if name == "together" else hash_tree(Path(path), sample_file)
     # one hash for a folder's many; '' stays '': there is nothing
     digests = {name: hash_value(tree) if isinstance(tree, dict) else tree for name, tree in hashes.items()}
     return digests if stage.reads else {**digests, SOURCE: record.get("source_stamp", [])}
+
+
+def _hash_input(root: Path, name: str) -> str | dict:
+    """Return the content hash of a file, of each file of a folder, or of those layers that are shown; '' for none."""
+    return hash_shown(root) if name == RETOUCH else hash_tree(root / name)
 
 
 def _changed_inputs(recorded: dict, root: Path, record: dict, stage: Stage, settings: Settings) -> list[str]:
@@ -90,6 +104,8 @@ def _changed_inputs(recorded: dict, root: Path, record: dict, stage: Stage, sett
     changed = [name for name in present.keys() & recorded.keys() - gone - {SOURCE} if present[name] != recorded[name]]
     # a setting that was emptied, or names a place since
     changed += [name for name in present.keys() ^ recorded.keys() if name.startswith(f"{stage.name}.")]
+    # made before there were layers
+    changed += [name for name in RETOUCHED if present.get(name) and name not in recorded]
     if SOURCE in present:
         source = hash_source(source_of(root, record))
         if source and not same_source(recorded.get(SOURCE, []), source):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Select the maps for the material: those at 4K if they were made of the solved ones, else the solved ones.
+"""Select the maps for the material: with the artist's layers, at 4K, or as solved, whichever is of the newest solve.
 
 No stage imports this module, so changing it makes no stage older.
 """
@@ -11,24 +11,49 @@ from pathlib import Path
 
 from .capture import Capture
 from .hashes import hash_tree
+from .retouch_layers import hash_shown
 
 WORN = "diffuse_albedo.png", "specular_albedo.png", "normal.png"
 """The maps that a material needs."""
 
 
 def find_newest_maps(capture: Capture) -> list[Path]:
-    """Return the WORN maps of maps_4k/ if it is complete and was made of those in maps/, else of maps/.
+    """Return the WORN maps of maps_retouched/, else of maps_4k/, if complete and made of those before, else of maps/.
 
-    capture.json tells by content what maps_4k/ was made of; times decide only for maps from elsewhere, because a copy
-    of a capture may have any. Missing solved maps contradict nothing. Raises Problem for a damaged capture.json,
-    OSError for unreadable files.
+    capture.json tells by content what a folder was made of; times decide only for maps from elsewhere, because a copy
+    of a capture may have any. Missing solved maps contradict nothing. Layers that have changed since do not count: the
+    maps with them as they were are nearer to what is wanted than those without. Raises Problem for a damaged
+    capture.json, OSError for unreadable files.
     """
-    solved, enlarged = ([folder / name for name in WORN] for folder in (capture.maps, capture.maps_4k))
-    if not all(path.is_file() for path in enlarged):
+    record, solved = capture.read()["stages"], _worn(capture.maps)
+    enlarged = _worn(capture.maps_4k)
+    if not _are_of(record.get("upscale"), enlarged, solved):
         return solved
-    made_of = capture.read()["stages"].get("upscale", {}).get("inputs")
-    if made_of is None:
-        latest = max((path.stat().st_mtime for path in solved if path.is_file()), default=0.0)
-        return enlarged if min(path.stat().st_mtime for path in enlarged) >= latest else solved
-    same = all(hash_tree(path) in ("", made_of.get(f"maps/{path.name}")) for path in solved)
-    return enlarged if same else solved
+    retouched = _worn(capture.maps_retouched)
+    is_recorded = "retouch" in record and bool(hash_shown(capture.root))
+    return retouched if is_recorded and _are_of(record["retouch"], retouched, enlarged) else enlarged
+
+
+def find_skin_weight(capture: Capture) -> Path:
+    """Return how far each place of the newest maps follows the skin tone: maps/skin_weight.png, or with the layers.
+
+    It is absent from older solves. Raises as `find_newest_maps`.
+    """
+    retouched = capture.maps_retouched / capture.skin_weight.name
+    worn = find_newest_maps(capture)[0].parent == capture.maps_retouched and retouched.is_file()
+    return retouched if worn else capture.skin_weight
+
+
+def _worn(folder: Path) -> list[Path]:
+    return [folder / name for name in WORN]
+
+
+def _are_of(done: dict | None, maps: list[Path], before: list[Path]) -> bool:
+    """Return whether maps are there and were made of those before, by the record of the stage that made them."""
+    if not all(path.is_file() for path in maps):
+        return False
+    if done is None:
+        latest = max((path.stat().st_mtime for path in before if path.is_file()), default=0.0)
+        return min(path.stat().st_mtime for path in maps) >= latest
+    made_of = done.get("inputs", {})
+    return all(hash_tree(path) in ("", made_of.get(f"{path.parent.name}/{path.name}")) for path in before)

@@ -25,6 +25,7 @@ from .code_key import data_files
 from .delivery_plan import MADE_BY, PROVENANCE, DeliveryPlan
 from .files import write_json
 from .hashes import hash_source, same_source
+from .retouch_layers import Layer, picture_of, read_shown
 from .tone_choice import ToneChange
 
 HERE = Path(__file__).parents[1]
@@ -43,6 +44,7 @@ def collect(
     `change` is what was baked into the skin after the solve; `tick` is called often, and may raise.
     """
     record, tone = capture.read(), describe_tone(change)
+    layers = [_layer(capture, layer, tick) for layer in read_shown(capture)]
     return {
         "made_by": MADE_BY,
         "written": time.strftime("%Y-%m-%dT%H:%M:%S"),
@@ -60,6 +62,7 @@ def collect(
         "capture": {"name": capture.root.name, "sources": _sources(capture.source, record, tick)},
         "stages": {name: _stage(done) for name, done in record["stages"].items()},
         **({} if tone is None else {"skin_tone": tone}),
+        **({"retouch": layers} if layers else {}),
         "weights": _weights(record, settings, tick),
         "data": {
             "built-in head": "MakeHuman base mesh and targets, CC0",
@@ -75,6 +78,12 @@ def describe_tone(change: ToneChange | None) -> dict | None:
     if change is None:
         return None
     return {"solved_srgb": list(change.solved), "chosen_srgb": list(change.chosen), "baked_into": "skin"}
+
+
+def _layer(capture: Capture, layer: Layer, tick: Callable[[], None]) -> dict:
+    """Return what a delivery tells of an artist's layer; its name is the artist's own."""
+    look = {"map": layer.map, "opacity": layer.opacity, "keeps_colours": layer.locked}
+    return {**look, "sha256": sha256(picture_of(capture, layer), tick)}
 
 
 def finish(folder: Path, **versions: str) -> None:

@@ -17,14 +17,18 @@ from ..settings.settings import Settings, tooltips
 from . import stages
 from .capture import Capture
 from .files import replacing
-from .freshness import STALE
+from .freshness import STALE, has_work
 from .messages import name_some
 
 
 def write(capture: Capture, settings: Settings) -> None:
     """Write the report; `settings` decide which stages are out of date. Raises Problem if it cannot be written."""
     record = capture.read()
-    sections = (_section(capture, stage, record["stages"].get(stage.name), settings) for stage in stages.STAGES)
+    sections = (
+        _section(capture, stage, record["stages"].get(stage.name), settings)
+        for stage in stages.STAGES
+        if has_work(capture.root, record, stage)
+    )
     renders = _pictures(
         sorted(p for p in capture.renders.glob("*") if p.suffix.lower() in (".jpg", ".jpeg", ".png")), "Render"
     )
@@ -78,9 +82,10 @@ def _finding(finding: dict) -> str:
 
 def _summary(record: dict) -> str:
     entries = record["stages"].values()
+    count = len({*stages.ALWAYS, *record["stages"]})
     seconds = sum(entry["seconds"] for entry in entries)
     last = max((entry["finished"].replace("T", " ") for entry in entries), default="never")
-    return f"{len(entries)} of {len(stages.STAGES)} stages finished in {_duration(seconds)}; last change {escape(last)}"
+    return f"{len(entries)} of {count} stages finished in {_duration(seconds)}; last change {escape(last)}"
 
 
 def _section(capture: Capture, stage: stages.Stage, finished: dict | None, settings: Settings) -> str:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The chain: the ten stages from a video to a relightable head, and the files that each reads and writes.
+"""The chain: the eleven stages from a video to a relightable head, and the files that each reads and writes.
 
 Start here. A stage is one function, `run(capture, settings, report)` of its module: it reads files of the capture
 folder, calls the rooms below and writes other files of that folder, and knows nothing of the stages beside it. So each
@@ -23,6 +23,7 @@ class Stage:
     Optional inputs are read if they exist. `shared` names the shared settings (seed, device) that the result depends
     on; code_key.py derives from the sources which code and shipped files it depends on. `on_device`: it can compute on
     a GPU. `estimates`: a tool that runs after it, whose figures are recorded with its own; if it fails, they are not.
+    `only_with`: an optional input without which there is nothing to do, and nothing is written.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Stage:
     shared: tuple[str, ...] = ()
     on_device: bool = False
     estimates: str = ""
+    only_with: str = ""
 
 
 MAPS = (
@@ -47,6 +49,9 @@ MAPS = (
 SOLVE_INPUTS = ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png")
 SOLVED = tuple(f"maps/{name}" for name in MAPS)
 ENLARGED = tuple(f"maps_4k/{name}" for name in MAPS)
+RETOUCH = "retouch/"
+"""The artist's layers (retouch_layers.py)."""
+RETOUCHED = tuple(f"maps_retouched/{name}" for name in MAPS[:4])
 STRANDS = "strands.npz"
 """Single hairs for Grow Hair, beside the delivered maps; only if hair was found."""
 OPEN_EYES = ("head_open.obj", "eyes.json")
@@ -145,6 +150,17 @@ STAGES = (
         shared=("seed", "device"),
         on_device=True,
     ),
+    # Lay the artist's layers over the 4K maps; find hair, and the skin below it, in what they show.
+    Stage(
+        name="retouch",
+        label="Retouch",
+        module="core.stages.upscale.retouch",
+        reads=("head.obj", *SOLVED, *ENLARGED),
+        writes=RETOUCHED,
+        optional_reads=(RETOUCH, "texture_confidence.exr", PARTS),
+        shared=("seed",),
+        only_with=RETOUCH,
+    ),
     # Bake the maps into the UVs of the artist's own mesh, and texture the scan.
     Stage(
         name="transfer",
@@ -152,7 +168,7 @@ STAGES = (
         module="core.stages.transfer",
         reads=("head.obj", *SOLVED),
         writes=("delivery/",),
-        optional_reads=(*ENLARGED, "own_head.obj", "own_head.json", "scan.ply", "frames/", "cameras/"),
+        optional_reads=(*ENLARGED, *RETOUCHED, "own_head.obj", "own_head.json", "scan.ply", "frames/", "cameras/"),
     ),
 )
 
@@ -172,6 +188,18 @@ TOOLS = (
         reads=("capture.json",),
         optional_reads=("frames/", *SOLVE_INPUTS),
         on_device=True,
+    ),
+    Stage(
+        name="retouch_import",
+        label="Import Layer",
+        module="core.imaging.retouch_import",
+        reads=tuple(name for name in SOLVED if name.endswith(".png")),
+    ),
+    Stage(
+        name="retouch_frame",
+        label="Frame to Copy From",
+        module="core.stages.texture.frame_patch",
+        reads=("head.obj", "frames/", "cameras/", "delit/", "maps/diffuse_albedo.exr"),
     ),
     Stage(name="colours", label="Colours", module="core.stages.frames.colour_previews"),
     Stage(name="white_point", label="White Point", module="core.stages.solve.white_point", reads=("frames/",)),
@@ -193,6 +221,8 @@ TOOLS = (
 
 LABELS = {stage.name: stage.label for stage in (*STAGES, *TOOLS)}
 NAMES = tuple(stage.name for stage in STAGES)
+ALWAYS = tuple(stage.name for stage in STAGES if not stage.only_with)
+"""Stages that every capture goes through."""
 MASK_STAGE = "shadow_mask"
 
 

@@ -20,6 +20,7 @@ from ..capture.capture import Capture
 from ..capture.delivery_plan import PACKING, TEXTURES, DeliveryPlan
 from ..capture.files import replacing_folder, write_json
 from ..capture.messages import Problem, Reporter
+from ..capture.retouch_layers import hash_shown
 from ..capture.stages import advise_again
 from ..capture.tone_choice import ToneChange
 from ..face import template
@@ -160,8 +161,7 @@ def _tiles(capture: Capture, plan: DeliveryPlan, settings: Settings) -> dict[int
             for number in numbers or [0]
         }
     else:
-        enlarged = capture.verdict(stages.by_name("upscale"), settings).state in freshness.FINISHED
-        folder = capture.maps_4k if enlarged else capture.maps
+        folder = _head_maps(capture, settings)
         files = {
             HEAD_TILE: {
                 "albedo": folder / "diffuse_albedo.png",
@@ -180,6 +180,17 @@ def _tiles(capture: Capture, plan: DeliveryPlan, settings: Settings) -> dict[int
             "This capture has no albedo without hair.", "Run the stage 4K Maps again, or deliver the albedo as it is."
         )
     return files
+
+
+def _head_maps(capture: Capture, settings: Settings) -> Path:
+    """Return the folder of the head's maps: with the artist's layers, at 4K, or as solved."""
+    finished = {
+        name: capture.verdict(stages.by_name(name), settings).state in freshness.FINISHED
+        for name in ("upscale", "retouch")
+    }
+    if finished["upscale"] and finished["retouch"] and hash_shown(capture.root):
+        return capture.maps_retouched
+    return capture.maps_4k if finished["upscale"] else capture.maps
 
 
 def _mean_specular(capture: Capture) -> float:

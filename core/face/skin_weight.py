@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..capture.capture import Capture
+from ..capture.newest_maps import find_skin_weight
 from ..capture.skin_regions import HAIR_MASKS, HAIR_ZONE, LIPS_TONE, NO_SKIN
 from ..capture.toned_albedo import weigh_hair
 from ..imaging import images
@@ -31,6 +32,14 @@ def weigh_skin(albedo: np.ndarray, tone: np.ndarray, hair: np.ndarray) -> np.nda
     return (weigh_hair(albedo, zone, tone) * _without_lips(len(albedo))).astype(np.float32)
 
 
+def weigh_layer(albedo: np.ndarray, tone: np.ndarray) -> np.ndarray:
+    """Return how far each texel of an artist's layer, linear [S, S, 3] over skin of a linear tone [3], follows it.
+
+    The add-on does the same (toned_picture.py there).
+    """
+    return weigh_hair(albedo, np.maximum.reduce([template.mask(name, len(albedo)) for name in NO_SKIN]), tone)
+
+
 def measure_tone(capture: Capture) -> Colour:
     """Return the mean of the facial skin of a capture's albedo, sRGB: the tone of maps that have none on record.
 
@@ -47,6 +56,14 @@ def mean_skin(albedo: np.ndarray) -> np.ndarray:
 
 
 def read_skin_weight(capture: Capture, size: int) -> np.ndarray:
+    """Return the weight of a capture's newest maps, float32 [size, size]: as solved, or with the artist's layers."""
+    path = find_skin_weight(capture)
+    if path == capture.skin_weight:
+        return read_solved_weight(capture, size)
+    return images.resize(images.read_mask(path), size, size).clip(0, 1)
+
+
+def read_solved_weight(capture: Capture, size: int) -> np.ndarray:
     """Return the weight of a capture's solved maps, float32 [size, size]."""
     if capture.skin_weight.is_file():
         weight = images.read_mask(capture.skin_weight)

@@ -29,12 +29,14 @@ COPY_ANEW = "Part of its data is lost: copy it from the camera or a backup again
 SAVE_ANEW = "Save it again as PNG, JPEG or EXR."
 
 
-def open_picture(path: Path) -> oiio.ImageInput:
-    """Open a picture and read its header.
+def open_picture(path: Path, straight: bool = False) -> oiio.ImageInput:
+    """Open a picture and read its header; `straight`: its colours are not to be multiplied by its alpha.
 
     Raises Problem for a file that is not a picture, or one that needs more than MOST_PICTURE_BYTES.
     """
-    image = oiio.ImageInput.open(str(path)) if Path(path).is_file() else None  # a pipe would block for ever
+    config = oiio.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", int(straight))
+    image = oiio.ImageInput.open(str(path), config) if Path(path).is_file() else None  # a pipe would block for ever
     if image is None:
         raise _unreadable(path, error_of(oiio))
     spec = image.spec()
@@ -55,12 +57,12 @@ def open_picture(path: Path) -> oiio.ImageInput:
     return image
 
 
-def read_pixels(path: Path) -> tuple[np.ndarray, oiio.ImageSpec]:
-    """Return the stored values float32 [H, W, C], not yet upright, and the header.
+def read_pixels(path: Path, straight: bool = False) -> tuple[np.ndarray, oiio.ImageSpec]:
+    """Return the stored values float32 [H, W, C], not yet upright, and the header; `straight` as in open_picture.
 
     Raises Problem for a file that is cut off or has lost data, and for values that are not finite.
     """
-    image = open_picture(path)
+    image = open_picture(path, straight)
     pixels = image.read_image(oiio.FLOAT)
     error, spec, is_jpeg = error_of(image), image.spec(), image.format_name() == "jpeg"
     image.close()

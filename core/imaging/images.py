@@ -105,6 +105,18 @@ def read_data(path: Path) -> np.ndarray:
     return _read(Path(path))[0]
 
 
+def read_straight(path: Path) -> tuple[np.ndarray, Colour]:
+    """Return the stored values [H, W, C] of a picture whose last channel may be alpha, and the colour that it states.
+
+    Colours are as they are where alpha is 1; an EXR stores them multiplied by it.
+    """
+    pixels, spec = read_pixels(Path(path), straight=True)
+    if spec.alpha_channel >= 0 and spec.format in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE):
+        alpha = pixels[..., spec.alpha_channel : spec.alpha_channel + 1]
+        pixels[..., : spec.alpha_channel] /= np.maximum(alpha, 1e-6)
+    return pixels, _stated_colour(Path(path), kind_of(Path(path)), spec)
+
+
 def _read(path: Path, thorough: bool = False) -> tuple[np.ndarray, Colour]:
     kind = kind_of(path)
     if kind == HEIF:

@@ -22,6 +22,7 @@ from .stage_settings import (
     DeliverSettings,
     FramesSettings,
     RegistrationSettings,
+    RetouchSettings,
     ScanSettings,
     ShadowMaskSettings,
     SolveSettings,
@@ -50,6 +51,7 @@ class Settings:
     shadow_mask: ShadowMaskSettings = field(default_factory=ShadowMaskSettings)
     solve: SolveSettings = field(default_factory=SolveSettings)
     upscale: UpscaleSettings = field(default_factory=UpscaleSettings)
+    retouch: RetouchSettings = field(default_factory=RetouchSettings)
     transfer: TransferSettings = field(default_factory=TransferSettings)
     deliver: DeliverSettings = field(default_factory=DeliverSettings)
 

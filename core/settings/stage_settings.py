@@ -193,6 +193,24 @@ class UpscaleSettings:
 
 
 @dataclass(frozen=True)
+class RetouchSettings:
+    """What the tools Import Layer and Copy From a Frame are asked for; the stage itself has no settings."""
+
+    picture: str = setting("", form="a path", affects_result=False)
+    """Picture to import as a layer, with its folder"""
+    over: str = setting("albedo", choices=("albedo", "specular", "normal"), affects_result=False)
+    """Map that the picture is laid over"""
+    layer: str = setting("", form="a name", affects_result=False)
+    """Name of the layer; empty: that of the picture"""
+    whole: bool = setting(False, affects_result=False)
+    """Take a picture without alpha, which covers all that is below"""
+    frame: str = setting("", form="a frame's name", affects_result=False)
+    """Frame to unfold onto the head"""
+    size: int = setting(2048, min=256, max=8192, unit="px", affects_result=False)
+    """Side of the unfolded frame"""
+
+
+@dataclass(frozen=True)
 class TransferSettings:
     size: int = setting(4096, min=256, max=8192, unit="px")
     """Side of each map that is baked into the UVs of your own head mesh"""

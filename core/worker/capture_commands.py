@@ -13,6 +13,7 @@ from pathlib import Path
 
 from ..capture import artist_landmarks, deletion, report, stages
 from ..capture.capture import Capture
+from ..capture.freshness import has_work
 from ..capture.messages import Problem
 from .commands import add_command, path_of, refuse_exchanged
 from .job import last_settings
@@ -57,6 +58,8 @@ def _status(options: argparse.Namespace) -> int:
     chosen = last_settings(capture)
     print(f"source        {capture.source or 'none yet'}")
     for stage in stages.STAGES:
+        if not has_work(capture.root, record, stage):
+            continue
         finished, verdict = record["stages"].get(stage.name), capture.verdict(stage, chosen)
         print(
             f"{stage.name:13} {verdict.state:6}"

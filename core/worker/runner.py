@@ -19,7 +19,7 @@ from .. import __version__
 from ..capture import report, tone_choice, unforeseen
 from ..capture.capture import Capture
 from ..capture.files import storage_problem
-from ..capture.freshness import FINISHED, OLDER
+from ..capture.freshness import FINISHED, OLDER, has_work
 from ..capture.messages import (
     Cancelled,
     CancelledError,
@@ -87,8 +87,11 @@ def run_stage(stage: Stage, job: JobRequest, emit: Callable[[Message], None], ca
     """
     capture, settings = job.capture, job.settings
     state = capture.state(stage, settings)
+    record = capture.read()
+    if not has_work(capture.root, record, stage):
+        return state
     if state in FINISHED:
-        finished = capture.read()["stages"][stage.name]
+        finished = record["stages"][stage.name]
         emit(StageDone(stage.name, finished["seconds"], True, finished["figures"]))
         return state
     with at_work(stage, capture, emit, cancelled) as reporter:
@@ -99,7 +102,8 @@ def run_stage(stage: Stage, job: JobRequest, emit: Callable[[Message], None], ca
             conditions = capture.conditions(stage, settings)
             started = time.monotonic()
             _room(stage).run(capture, settings, reporter)
-            missing = [name for name in stage.writes if not capture.has(name)]
+            empty = stage.only_with and not conditions["inputs"][stage.only_with]
+            missing = [] if empty else [name for name in stage.writes if not capture.has(name)]
             if missing:
                 raise RuntimeError(f"the stage {stage.name} ended without writing {missing[0]}")
             _add_estimate(stage, capture, settings, reporter)

@@ -38,9 +38,9 @@ def main() -> None:
     if options.work.exists():
         parser.error(f"{options.work} exists: name a new folder.")
     standard, draft = (options.work / f"{quality}.wildcap" for quality in ("standard", "draft"))
-    rows = {"standard": measure_stages(standard, stages.NAMES, "standard")}
+    rows = {"standard": measure_stages(standard, stages.ALWAYS, "standard")}
     shutil.copytree(standard, draft, ignore=shutil.ignore_patterns("maps*", "checkpoints"))
-    rest = tuple(name for name in stages.NAMES if name not in SHARED)
+    rest = tuple(name for name in stages.ALWAYS if name not in SHARED)
     rows["draft"] = {**{name: rows["standard"][name] for name in SHARED}, **measure_stages(draft, rest, "draft")}
     record = {quality: {**costs, "together": sum_costs(costs)} for quality, costs in rows.items()}
     command = "python -m research.benchmarks.costs WORK --json research/records/costs.json"
@@ -100,7 +100,7 @@ def sum_costs(costs: dict[str, dict]) -> dict:
 
 def table(rows: dict) -> str:
     """Lay out the costs as Markdown: a line for each stage, a column for each quality."""
-    lines = [[name, *(cell(costs[name]) for costs in rows.values())] for name in stages.NAMES]
+    lines = [[name, *(cell(costs[name]) for costs in rows.values())] for name in stages.ALWAYS]
     total = ["**together**", *(f"**{costs['together']['minutes']:.1f} min**" for costs in rows.values())]
     return figures.markdown(["stage: seconds, peak memory", *rows], [*lines, total])
 

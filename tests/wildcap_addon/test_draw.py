@@ -64,6 +64,7 @@ def draw_all() -> tuple[list[str], list]:
         ("its head", "Assemble Material"),
         ("its material", "Render"),
         ("painting", "Save Mask and Leave"),
+        ("painting a layer", "Save Layer and Leave"),
     ],
 )
 def test_every_panel_draws_in_every_state_and_none_works_meanwhile(addon, tmp_path, state, button):
@@ -80,10 +81,13 @@ def test_every_panel_draws_in_every_state_and_none_works_meanwhile(addon, tmp_pa
         bpy.ops.wildcap.assemble_material()
     if state == "painting":
         bpy.ops.wildcap.paint_mask()
+    if state == "painting a layer":
+        bpy.context.scene.wildcap.layer_side = "1024"
+        bpy.ops.wildcap.layer_add(map='albedo')
     addon("status").refresh(bpy.context)
     draw_all()  # the first drawing imports what Python imports late
     labels, work = draw_all()
-    if state == "painting":
+    if state.startswith("painting"):
         bpy.ops.wildcap.finish_mask()
     assert button in labels and not work
     with noted() as work, open(__file__, encoding="utf-8"):

@@ -17,7 +17,7 @@ def step(addon):
     """Facts by keyword -> the next step. `done`, `stale`, `older` and `absent` name stages; the rest are to do."""
     next_step, status = addon("next_step"), addon("status")
 
-    def of(capture=True, python=True, head=-1.0, maps=-1.0, running="", painting=False, source="face.mp4", **known):
+    def of(capture=True, python=True, head=-1.0, maps=-1.0, running="", painting="", source="face.mp4", **known):
         stages = dict.fromkeys((*BEFORE, "solve", "upscale"), "to do")
         for state in ("done", "stale", "older", "absent"):
             stages |= dict.fromkeys(known.pop(state, ()), state)
@@ -57,7 +57,7 @@ SAMPLE = {"source": "", "absent": ("texture", "shadow_mask", "solve"), **HEAD, *
     ("operator", "facts"),
     [
         ("cancel", {"running": "solve"}),
-        ("finish_mask", {"painting": True}),
+        ("finish_mask", {"painting": "SHADOW"}),
         ("solve", {**FINISHED, "done": BEFORE, "stale": ("solve",)}),
         ("render", {**FINISHED, "done": (*BEFORE[1:], "solve"), "stale": ("frames",)}),  # not back to the start
         ("render", {**FINISHED, "older": (*BEFORE, "solve")}),

@@ -12,7 +12,8 @@ import bpy
 
 from . import view
 
-_SETTINGS = ("mode", "canvas", "use_stencil_layer", "stencil_image", "stencil_color", "invert_stencil")
+_IMAGES = ("canvas", "stencil_image", "clone_image")
+_SETTINGS = ("mode", "use_stencil_layer", "stencil_color", "invert_stencil", "use_clone_layer", *_IMAGES)
 MODES = {'PAINT_WEIGHT': 'WEIGHT_PAINT', 'PAINT_VERTEX': 'VERTEX_PAINT', 'PAINT_TEXTURE': 'TEXTURE_PAINT'}
 """Mode of a context -> its name for mode_set, if that differs."""
 
@@ -43,7 +44,7 @@ def put_back(context, before: dict) -> None:
     """Restore the state, from Object Mode; what was deleted meanwhile is skipped."""
     paint = context.scene.tool_settings.image_paint
     for name, value in before["paint"].items():
-        setattr(paint, name, bpy.data.images.get(value or "") if name in ("canvas", "stencil_image") else value)
+        setattr(paint, name, bpy.data.images.get(value or "") if name in _IMAGES else value)
     view.restore(before["views"])
     head = bpy.data.objects.get(before.get("head", ""))
     if head is not None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mask brush: Blender 4.2 assigns brushes, later versions activate them as assets.
+"""Brushes of a painting: Blender 4.2 assigns them, later versions activate them as assets.
 
 A MASK brush paints its weight into the stencil image, the opposite with Ctrl held.
 """
@@ -9,20 +9,21 @@ import contextlib
 
 import bpy
 
-NAME = "WildCap Mask"
 RADIUS_PX = 40  # initial radius of the brush
 
 
-def activate(context) -> dict:
-    """Activate the mask brush in Texture Paint mode, and return what `restore` needs."""
+def activate(context, name: str, kind: str) -> dict:
+    """Activate a brush of ours, of that kind, in Texture Paint mode, and return what `restore` needs."""
     paint = context.scene.tool_settings.image_paint
     before = {
+        "ours": name,
+        "kind": kind,
         "brush": paint.brush.name if paint.brush else "",
         "reference": _reference(paint),
         "brushes": [b.name for b in bpy.data.brushes],
     }
-    brush = bpy.data.brushes.get(NAME) or bpy.data.brushes.new(NAME, mode='TEXTURE_PAINT')
-    setattr(brush, _type_property(brush), 'MASK')
+    brush = bpy.data.brushes.get(name) or bpy.data.brushes.new(name, mode='TEXTURE_PAINT')
+    set_kind(brush, kind)
     brush.weight = brush.strength = 1.0
     if bpy.app.version >= (4, 3, 0):
         brush.asset_mark()
@@ -57,7 +58,7 @@ def restore(context, before: dict) -> None:
         with contextlib.suppress(AttributeError):  # read-only since 5.0
             paint.brush = bpy.data.brushes[before["brush"]]
     for each in list(bpy.data.brushes):
-        if each.name == NAME or each != paint.brush and _came_with_tool(each, before):
+        if each.name == before["ours"] or each != paint.brush and _came_with_tool(each, before):
             bpy.data.brushes.remove(each)
 
 
@@ -77,7 +78,7 @@ def keep_active(context):
 def _came_with_tool(brush, before: dict) -> bool:
     return (
         brush.library is not None
-        and getattr(brush, _type_property(brush)) == 'MASK'
+        and getattr(brush, _type_property(brush)) == before["kind"]
         and brush.name not in before.get("brushes", [brush.name])
     )
 
@@ -86,6 +87,16 @@ def _reference(paint) -> dict | None:
     reference = getattr(paint, "brush_asset_reference", None)
     names = ("asset_library_type", "asset_library_identifier", "relative_asset_identifier")
     return {name: getattr(reference, name) for name in names} if reference is not None else None
+
+
+def set_kind(brush, kind: str) -> None:
+    """Give a brush a kind: DRAW, SOFTEN, SMEAR, CLONE, FILL or MASK."""
+    setattr(brush, _type_property(brush), kind)
+
+
+def kind_of(brush) -> str:
+    """Return the kind of a brush, '' for none."""
+    return getattr(brush, _type_property(brush)) if brush is not None else ""
 
 
 def _type_property(brush) -> str:

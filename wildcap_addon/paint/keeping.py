@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Storage of a painted mask, at once or in a thread, so that compressing and writing never delay a stroke.
+"""Storage of a painting, at once or in a thread, so that compressing and writing never delay a stroke.
 
 Blender's thread only copies the pixels, into an array that is reused, as allocating one takes longer than copying. A
-mask that this session did not write (an older one, or one from another program) goes to the history first.
+file that this session did not write (an older one, or one from another program) goes to the history first.
 """
 
 import threading
@@ -12,44 +12,41 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.capture.capture import Capture
 from ...core.capture.files import storage_problem
 from ...core.capture.messages import Problem
-from . import mask_image
+from .. import data_blocks
 
 _pixels: np.ndarray | None = None  # the reused array; a session has one Saving at a time
 
 
-def store_painting(mask: np.ndarray, capture: Capture, mask_kind: str, stamp: tuple) -> tuple:
-    """Store a mask [H, W] in [0, 1], rows from the top, if it differs from the capture's.
+def store_painting(pixels: np.ndarray, painting, stamp: tuple) -> tuple:
+    """Store an image's pixels [H, W, C], rows from the bottom, if they differ from the capture's.
 
-    `stamp` is the size and time of the file that this session wrote last, () before the first; the new one is returned.
-    Raises Problem if it cannot be written.
+    `painting` is a MaskPainting or a LayerPainting; `stamp` is the size and time of the file that this session wrote
+    last, () before the first; the new one is returned. Raises Problem if it cannot be written.
     """
-    path = mask_image.file_of(capture, mask_kind)
     try:
-        was_written = mask_image.store_mask(mask, capture, mask_kind, keep=_stamp(path) != tuple(stamp))
-        return _stamp(path) if was_written else stamp
+        was_written = painting.store(pixels, keep=_stamp(painting.file) != tuple(stamp))
+        return _stamp(painting.file) if was_written else stamp
     except OSError as error:  # a file server may be briefly unavailable: the next look tries again
-        raise storage_problem(error, path) from error
+        raise storage_problem(error, painting.file) from error
 
 
 class Saving(threading.Thread):
-    """Thread that stores an image's mask once; it touches nothing of Blender's."""
+    """Thread that stores an image once; it touches nothing of Blender's."""
 
-    def __init__(self, image: bpy.types.Image, capture: Capture, mask_kind: str, stamp: tuple):
+    def __init__(self, image: bpy.types.Image, painting, stamp: tuple):
         global _pixels
-        super().__init__(name="wildcap-mask", daemon=False)  # Blender waits for it when it closes
-        _pixels = mask_image.pixels(image, _pixels)
-        self._arguments = _pixels, capture, mask_kind, stamp
+        super().__init__(name="wildcap-painting", daemon=False)  # Blender waits for it when it closes
+        _pixels = data_blocks.read_pixels(image, _pixels)
+        self._arguments = _pixels, painting, stamp
         self._stamp: tuple = stamp
         self._problem: Problem | None = None
         self.start()
 
     def run(self) -> None:
-        pixels, *rest = self._arguments
         try:
-            self._stamp = store_painting(mask_image.from_top(pixels), *rest)
+            self._stamp = store_painting(*self._arguments)
         except Problem as error:
             self._problem = error
 
@@ -69,7 +66,7 @@ def prepare(image: bpy.types.Image) -> None:
         global _pixels
         _pixels = np.full(shape, 1.0, np.float32)  # the memory is allocated only when it is written
 
-    threading.Thread(target=work, name="wildcap-mask-array", daemon=True).start()
+    threading.Thread(target=work, name="wildcap-painting-array", daemon=True).start()
 
 
 def forget() -> None:

@@ -5,8 +5,6 @@
 The only place of the add-on that flips rows: Blender counts an image's rows from the bottom, files from the top.
 """
 
-import struct
-import zlib
 from pathlib import Path
 
 import bpy
@@ -16,7 +14,8 @@ from ...core.capture import mask_history
 from ...core.capture.capture import Capture
 from ...core.capture.files import replacing
 from ...core.capture.messages import Problem
-from .. import colours
+from .. import colours, data_blocks
+from . import png
 
 
 def file_of(capture: Capture, mask_kind: str) -> Path:
@@ -92,15 +91,7 @@ def refresh(image: bpy.types.Image, capture: Capture, mask_kind: str) -> None:
 
 def mask_values(image: bpy.types.Image) -> np.ndarray:
     """Return the mask float32 [H, W] in [0, 1], rows from the top."""
-    return from_top(pixels(image))
-
-
-def pixels(image: bpy.types.Image, into: np.ndarray | None = None) -> np.ndarray:
-    """Return an image's pixels, float32 [H, W, C], rows from the bottom; in `into` if that has the shape."""
-    shape = image.size[1], image.size[0], image.channels
-    buffer = into if into is not None and into.shape == shape else np.empty(shape, np.float32)
-    image.pixels.foreach_get(buffer.ravel())
-    return buffer
+    return from_top(data_blocks.read_pixels(image))
 
 
 def from_top(pixels: np.ndarray) -> np.ndarray:
@@ -155,14 +146,5 @@ def write(path: Path, content: bytes) -> None:
 
 
 def grey_png(mask: np.ndarray) -> bytes:
-    """Return an 8 bit grey PNG of a mask [H, W] in [0, 1], rows from the top (ISO/IEC 15948)."""
-    height, width = mask.shape
-    rows = np.zeros((height, width + 1), np.uint8)  # a row starts with its filter type, 0
-    rows[:, 1:] = np.clip(np.round(mask * 255), 0, 255)
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    data = zlib.compress(rows.tobytes(), 6)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data) + chunk(b"IEND", b"")
+    """Return an 8 bit grey PNG of a mask [H, W] in [0, 1], rows from the top."""
+    return png.encode(np.clip(np.round(mask * 255), 0, 255).astype(np.uint8)[..., None])

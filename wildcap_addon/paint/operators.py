@@ -49,15 +49,15 @@ class WILDCAP_OT_paint_mask(CaptureOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_finish_mask(BaseOperator, bpy.types.Operator):
-    """Save the mask to the capture and return to Object Mode."""
+    """Save the mask or layer to the capture and return to Object Mode."""
 
     bl_idname = "wildcap.finish_mask"
-    bl_label = "Save Mask and Leave"
+    bl_label = "Save and Leave"
     bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
     def poll(cls, context):
-        return cls.allowed(session.active(), "No mask is being painted: click Paint on the Head, under Masks, first")
+        return cls.allowed(session.active(), "Nothing is being painted: begin under Masks, or under Retouch")
 
     def work(self, context):
         session.end_painting(context)

@@ -1,50 +1,52 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Painting session: from Paint Mask to the saved mask, with the artist's state restored.
+"""Painting session: from the first click to the saved mask or layer, with the artist's state restored.
 
 The session consists of names and values, as an undo replaces every data-block. However the artist leaves (the button,
-Tab, opening or saving a file), the mask is saved in the capture, and within seconds of each stroke, in case Blender is
-killed. A .blend saved during painting reopens in it.
+Tab, opening or saving a file), what was painted is saved in the capture, and within seconds of each stroke, in case
+Blender is killed. A .blend saved during painting reopens in it.
 """
 
 import json
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 
 import bpy
 
 from ...core.capture.capture import Capture
 from ...core.capture.messages import Problem
-from .. import captures, head, problems
-from . import before, brush, keeping, mask_image, places, sheet, view
+from .. import captures, data_blocks, problems
+from . import before, brush, keeping, places, sheet
+from .layer_painting import LayerPainting
+from .mask_painting import MaskPainting
 
-TINTS = {"SHADOW": "shadow_tint", "PROTECT": "protect_tint"}
-"""Scene properties with the colour of each mask."""
 WATCH_S = 0.5
 KEEP_UP_S = 3.0
-"""Interval of the checks for changes of the mask, each of which reads its pixels."""
+"""Interval of the checks for changes, each of which reads all pixels."""
+LAYER = 'LAYER'
+after_layers: list[Callable[[str], None]] = []
+"""Functions (capture folder) to call when the painting of a layer has ended."""
 
 
 @dataclass
 class Session:
-    """Painted mask, and the artist's state before."""
+    """What is painted, and the artist's state before."""
 
     root: str
     scene: str
     head: str
-    mask: str
-    which: str = 'SHADOW'  # or 'PROTECT'
+    mask: str  # the painted image
+    which: str = 'SHADOW'  # or 'PROTECT', or LAYER
+    layer: str = ""  # file of the layer
+    side: int = 0  # of the layer, in texels
     faces_sheet: bool = False  # the views show the sheet
     before: dict = field(default_factory=dict)
     brush: dict = field(default_factory=dict)
     looked: float = 0.0  # time of the last check for changes (time.monotonic)
     offered: str = ""  # kind of edit that a worker has prepared
-    # size and time of the mask's file as this session wrote it; any other file goes to the history first
+    # size and time of the file as this session wrote it; any other file goes to the history first
     written: tuple = ()
-
-    @property
-    def capture(self) -> Capture:
-        return Capture(self.root)
 
     @property
     def image(self) -> bpy.types.Image | None:
@@ -52,6 +54,7 @@ class Session:
 
 
 _session: Session | None = None
+_painting: MaskPainting | LayerPainting | None = None  # of the session
 _ended: Session | None = None  # the last one, as an undo may restore its scene
 _saving: keeping.Saving | None = None
 
@@ -65,12 +68,17 @@ def on_sheet() -> bool:
 
 
 def painted_kind() -> str:
-    """Return the painted mask, SHADOW or PROTECT; '' for none."""
+    """Return what is painted, SHADOW, PROTECT or LAYER; '' for nothing."""
     return _session.which if _session else ""
 
 
+def layer() -> LayerPainting | None:
+    """Return the painted layer; None if none is painted."""
+    return _painting if painted_kind() == LAYER else None
+
+
 def root() -> str:
-    """Return the folder of the capture whose mask is painted."""
+    """Return the folder of the capture that is painted."""
     return _session.root
 
 
@@ -79,8 +87,8 @@ def mask() -> bpy.types.Image:
     image = _session.image if _session else None
     if image is None:
         raise Problem(
-            "The mask is no longer in this file.",
-            "Leave the painting, and click Paint on the Head, under Masks, again.",
+            f"The {_painting.title if _painting else 'mask'} is no longer in this file.",
+            f"Leave the painting, and begin it again under {_painting.panel if _painting else 'Masks'}.",
         )
     return image
 
@@ -106,13 +114,13 @@ def push_undo(context) -> None:
             bpy.ops.image.invert(invert_r=False, invert_g=False, invert_b=False, invert_a=False)
 
 
-def begin_painting(context, item, use_sheet: bool, mask_kind: str = 'SHADOW') -> None:
-    """Enter Texture Paint on the head or the sheet, with the mask as tinted stencil and the mask brush.
+def begin_painting(context, item, use_sheet: bool, which: str = 'SHADOW', layer: str = "", side: int = 0) -> None:
+    """Enter Texture Paint on the head or the sheet, with a mask, or with the layer of that file and side.
 
-    Raises Problem without head or texture.
+    Raises Problem without head, or without what it is painted over.
     """
-    global _session
-    if _session is not None and _session.which == mask_kind:
+    global _session, _painting
+    if _session is not None and (_session.which, _session.layer) == (which, layer):
         places.follow_name(_session)
         with brush.keep_active(context):
             places.turn(context, _session, use_sheet)
@@ -120,37 +128,42 @@ def begin_painting(context, item, use_sheet: bool, mask_kind: str = 'SHADOW') ->
     end_painting(context)
     capture = captures.folder(item)
     obj = captures.require_head(context, item)
-    if not capture.texture_png.is_file():
-        raise Problem("This capture has no texture to paint over.", "Click Reconstruct first.")
-    texture = head.load_image(capture.texture_png)
-    image = mask_image.load(capture, mask_kind)
-    _session = Session(
-        str(capture.root), context.scene.name, obj.name, image.name, mask_kind, before=before.remember(context, obj)
+    painting = _make_painting(capture, which, layer, side)
+    image = painting.load()
+    _session, _painting = (
+        Session(
+            str(capture.root),
+            context.scene.name,
+            obj.name,
+            image.name,
+            which,
+            layer,
+            side,
+            before=before.remember(context, obj),
+        ),
+        painting,
     )
     before.at_rest(obj)
-    props, paint = context.scene.wildcap, context.scene.tool_settings.image_paint
-    view.set_up(_session.before["views"], props.tint_strength)
-    paint.mode = 'IMAGE'
-    paint.canvas = texture
-    paint.use_stencil_layer = True
-    paint.stencil_image = image
-    paint.stencil_color = getattr(props, TINTS[mask_kind])
-    paint.invert_stencil = False
+    painting.set_up(context, image, _session.before["views"])
     try:
         places.enter(context, _session, use_sheet)
-        _session.brush = brush.activate(context)
+        _session.brush = painting.take_brush(context)
     except Exception:
         before.put_back(context, _session.before)
-        _session = None
+        _session = _painting = None
         raise
     keeping.prepare(image)
     _start_watching()
 
 
+def _make_painting(capture: Capture, which: str, layer: str, side: int) -> MaskPainting | LayerPainting:
+    return LayerPainting(capture, layer, side) if which == LAYER else MaskPainting(capture, which)
+
+
 def end_painting(context) -> None:
-    """Save the mask and restore the artist's state, also if the artist has left Texture Paint by other means."""
+    """Save the painting and restore the artist's state, also if the artist has left Texture Paint by other means."""
     global _ended
-    session = _session
+    session, painting = _session, _painting
     if session is None:
         return
     save()  # a Problem here leaves the session open, and nothing is lost
@@ -159,26 +172,24 @@ def end_painting(context) -> None:
     if context.mode != 'PAINT_TEXTURE' and session.head in context.view_layer.objects:
         places.enter(context, session, sheet.is_there())
     brush.restore(context, session.brush)
-    props = context.scene.wildcap  # keeps the tint for the next session
-    setattr(props, TINTS[session.which], context.scene.tool_settings.image_paint.stencil_color)
-    props.tint_strength = view.opacity(session.before["views"]) or props.tint_strength
+    painting.keep_look(context, session.before["views"])
     places.leave(context, session)
     before.put_back(context, session.before)
-    image = session.image
-    if image is not None and mask_image.file_of(session.capture, session.which).is_file():
-        image.reload()  # so that Blender does not ask to save it
-    elif image is not None:
-        bpy.data.images.remove(image)
+    if session.image is not None:
+        painting.discard(session.image)
     forget()
     _ended = session
+    if session.which == LAYER:
+        for hear in after_layers:
+            hear(session.root)
 
 
 def after_undo(context) -> None:
-    """Correct what an undo or redo leaves out: the views, and the end of a painting, whose mask stays as it was."""
+    """Correct what an undo or redo leaves out: the views, and the end of a painting, which stays as it was."""
     if _ended is not None:
         places.follow_name(_ended)
     if _session is not None and context.mode == 'OBJECT':
-        _session.written = ()  # undone past its start: the watch ends it, and the mask file goes to the history
+        _session.written = ()  # undone past its start: the watch ends it, and the file goes to the history
     elif _session is not None:
         places.face(_session, sheet.is_there())
     elif _ended is not None and context.mode == 'PAINT_TEXTURE':
@@ -189,17 +200,15 @@ def after_undo(context) -> None:
 
 
 def save() -> None:
-    """Write the mask to the capture if it has changed. Raises Problem if it cannot."""
+    """Write what was painted to the capture if it has changed. Raises Problem if it cannot."""
     wait()
     image = _session.image if _session else None
     if image is not None:
-        _session.written = keeping.store_painting(
-            mask_image.mask_values(image), _session.capture, _session.which, _session.written
-        )
+        _session.written = keeping.store_painting(data_blocks.read_pixels(image), _painting, _session.written)
 
 
 def keep_up(stroking: bool) -> None:
-    """Save a changed mask every few seconds, but not during a stroke; the main thread only copies the pixels."""
+    """Save what has changed every few seconds, but not during a stroke; the main thread only copies the pixels."""
     global _saving
     if _saving is not None and _saving.is_alive():
         return
@@ -210,11 +219,11 @@ def keep_up(stroking: bool) -> None:
     image = _session.image
     if not stroking and image is not None and image.is_dirty and time.monotonic() - _session.looked >= KEEP_UP_S:
         _session.looked = time.monotonic()
-        _saving = keeping.Saving(image, _session.capture, _session.which, _session.written)
+        _saving = keeping.Saving(image, _painting, _session.written)
 
 
 def wait() -> None:
-    """Wait for a mask that is being saved in a thread. Raises Problem if it could not be."""
+    """Wait for what is being saved in a thread. Raises Problem if it could not be."""
     global _saving
     saving, _saving = _saving, None
     if saving is not None:
@@ -225,8 +234,8 @@ def wait() -> None:
 
 def forget() -> None:
     """Drop the session without changing Blender's data, for a file that is being replaced."""
-    global _session, _ended
-    _session = _ended = None
+    global _session, _painting, _ended
+    _session = _painting = _ended = None
     keeping.forget()
 
 
@@ -261,11 +270,12 @@ def note() -> str:
 
 
 def go_on(text: str) -> None:
-    """Continue the session of a note, with the newer mask of file and capture."""
-    global _session
+    """Continue the session of a note, with the newer painting of file and capture."""
+    global _session, _painting
     try:
         _session = Session(**json.loads(text))
-        mask_image.refresh(mask(), _session.capture, _session.which)
+        _painting = _make_painting(Capture(_session.root), _session.which, _session.layer, _session.side)
+        _painting.refresh(mask())
     except (ValueError, TypeError):  # a note of another version
         forget()
         return
@@ -278,7 +288,7 @@ def go_on(text: str) -> None:
 
 
 def save_or_show() -> None:
-    """Save the mask; a Problem is shown in the tab."""
+    """Save the painting; a Problem is shown in the tab."""
     try:
         save()
     except Problem as problem:
@@ -286,7 +296,7 @@ def save_or_show() -> None:
 
 
 def stop() -> None:
-    """Save the mask and stop watching."""
+    """Save the painting and stop watching."""
     save_or_show()
     forget()
     if bpy.app.timers.is_registered(_watch):

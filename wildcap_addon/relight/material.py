@@ -14,7 +14,7 @@ import bpy
 
 from ...core.capture.capture import Capture
 from ...core.capture.messages import Problem
-from ...core.capture.newest_maps import find_newest_maps
+from ...core.capture.newest_maps import find_newest_maps, find_skin_weight
 from .. import captures, data_blocks, head, node_trees, toned_picture, tones
 from . import asset, node_group, regions
 
@@ -52,7 +52,7 @@ def assemble(context, item) -> tuple[bpy.types.Material, str]:
     before = material[SET].to_dict() if SET in material else {}
     regions.write(obj.data)
     height = capture.delivery / DISPLACEMENT[1]
-    _build(material, {path.name: path for path in (*maps, height, capture.skin_weight) if path.is_file()}, obj)
+    _build(material, {path.name: path for path in (*maps, height, find_skin_weight(capture)) if path.is_file()}, obj)
     worn = tones.of_maps(capture)
     if worn is not None:
         material[WORN] = worn.solved
@@ -73,8 +73,9 @@ def feed_weight(material: bpy.types.Material, capture: Capture) -> None:
     if tree.nodes[SKIN].inputs["Skin"].is_linked:
         return
     uv = tree.nodes.get("WildCap UV")
-    if capture.skin_weight.is_file() and uv is not None:
-        _add_map(material, WEIGHT_IMAGE, {WEIGHT_IMAGE[1]: capture.skin_weight}, uv, WEIGHT_PLACE)
+    path = find_skin_weight(capture)
+    if path.is_file() and uv is not None:
+        _add_map(material, WEIGHT_IMAGE, {WEIGHT_IMAGE[1]: path}, uv, WEIGHT_PLACE)
     else:
         node = _node(tree, WEIGHT, 'ShaderNodeTexImage', WEIGHT_PLACE)
         node.image = toned_picture.weight_image(material.name, capture)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...core.capture.capture import Capture
 from ...core.capture.messages import Problem
+from ...core.capture.newest_maps import find_newest_maps
 from ...core.capture.tone_choice import SAME, SolvedTone, find_chosen
 from ...core.settings.colour_values import Colour, to_linear
 from .. import colours, head, node_trees, toned_picture, tones
@@ -80,7 +81,8 @@ def _in_working_space(gain: np.ndarray, worn: Colour) -> tuple[float, ...]:
 
 def _show_in_solid(material: bpy.types.Material, capture: Capture, gain: np.ndarray | None) -> None:
     nodes = material.node_tree.nodes
-    source = capture.maps / toned_picture.ALBEDO
+    newest = find_newest_maps(capture)[0]
+    source = newest if newest.parent == capture.maps_retouched else capture.maps / toned_picture.ALBEDO
     shows_ours = nodes.active is not None and nodes.active.name in (ALBEDO, WEIGHT, toned_picture.NODE)
     if gain is None or not source.is_file() or _shown(material) != source.name:
         toned_picture.remove(material)

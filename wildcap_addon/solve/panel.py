@@ -44,7 +44,7 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         row.operator("wildcap.solve")
         row.operator("wildcap.solve_edited")
         for stage in stages.STAGES[stages.NAMES.index(stages.MASK_STAGE) + 1 :]:
-            if stage.name != "transfer":  # shown under Deliver
+            if stage.name not in ("transfer", "retouch"):  # under Deliver, and without settings
                 draw_settings(layout, item, stage, without=("skin_tone", "white_point", "together"))
 
 

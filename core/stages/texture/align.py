@@ -51,11 +51,25 @@ def align(observations: list[UnwrappedView], surface: Unfolded, report: Reporter
     return float(np.concatenate(moved).mean())
 
 
+def align_to(observation: UnwrappedView, log_texture: np.ndarray, observed: np.ndarray, surface: Unfolded) -> None:
+    """Resample one observation along its warp onto a texture, natural log [S, S, 3], where that was observed [S, S]."""
+    size = len(surface.covered)
+    observation.pixels = raster.bleed(observation.pixels, surface.covered)
+    consensus = _band(log_texture.mean(-1), observed)
+    warp = np.zeros((size, size, 2), np.float32)
+    for step in range(ROUNDS):
+        warp += _flow(consensus, _detail(observation), observation.weight)
+        warp *= np.minimum(1, LARGEST_WARP_SHARE * size / np.maximum(lengths(warp)[..., None], 1e-6))
+        observation.resample(_moved(observation.pixels, warp), warp if step == ROUNDS - 1 else None)
+
+
 def _detail(observation: UnwrappedView) -> np.ndarray:
+    return _band(observation.log_colour.mean(-1), observation.weight > 0)
+
+
+def _band(grey: np.ndarray, seen: np.ndarray) -> np.ndarray:
     """Return the band-passed log luminance [S, S], which can be matched whatever the light."""
-    grey = observation.log_colour.mean(-1)
-    observed = (observation.weight > 0).astype(np.float32)
-    size = len(grey)
+    observed, size = (seen > 0).astype(np.float32), len(grey)
     return (blurred(grey, observed, size / 1024) - blurred(grey, observed, 10 * size / 1024)) * observed
 
 

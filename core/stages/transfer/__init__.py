@@ -16,6 +16,7 @@ from ...capture import stages
 from ...capture.capture import Capture
 from ...capture.files import replacing_folder
 from ...capture.messages import Reporter
+from ...capture.newest_maps import find_newest_maps
 from ...capture.own_head import read_skin
 from ...face.head import read_head
 from ...face.skin_weight import read_skin_weight
@@ -34,7 +35,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """Write delivery/, whole or not at all, from head.obj and its maps, scan.ply and, if there is one, own_head.obj."""
     head = read_head(capture).mesh
     maps = capture.maps_4k if all((capture.maps_4k / name).is_file() for name in stages.MAPS) else capture.maps
-    solved = SolvedHead(head, baking.Source(head), maps)
+    solved = SolvedHead(head, baking.Source(head), find_newest_maps(capture)[0].parent, maps / "confidence.png")
+    maps = solved.maps
     with replacing_folder(capture.delivery) as folder:
         contents = {}
         if capture.own_head.is_file():
@@ -50,11 +52,12 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
 @dataclass(frozen=True)
 class SolvedHead:
-    """Built-in head, the same ready to be searched, and the folder of its maps."""
+    """Built-in head, the same ready to be searched, the folder of its maps, and the file of its confidence."""
 
     mesh: Mesh
     source: baking.Source
     maps: Path
+    confidence: Path
 
 
 def _own(capture: Capture, folder: Path, solved: SolvedHead, size: int, report: Reporter) -> dict:
@@ -92,7 +95,7 @@ def _own(capture: Capture, folder: Path, solved: SolvedHead, size: int, report: 
         report.progress(i + 0.9, len(numbers) + 1, f"baking tile {number}")
         specular = baking.bake(images.read_mask(maps / "specular_albedo.png"), at)
         images.write_data(folder / f"own_specular_albedo{suffix}", specular, bits=16)
-        confidence = baking.bake(images.read_mask(maps / "confidence.png"), at)
+        confidence = baking.bake(images.read_mask(solved.confidence), at)
         images.write_data(folder / f"own_confidence{suffix}", np.where(at.known, confidence, 0))
         images.write_data(folder / f"own_skin_weight{suffix}", _baked_weight(capture, at))
     (folder / "own_head.obj").write_bytes(capture.own_head.read_bytes())

@@ -28,7 +28,7 @@ from ...settings.settings import Settings
 from ...solver.recipes import OURS
 from . import detail, drawing, gloss, grooming, hair
 from .maps import HeadMaps, read_maps
-from .surface import lay_out
+from .surface import HeadSurface, lay_out
 from .whole_head import DARKEST_LINEAR, complete
 
 # rows that are worked on at once: a whole 4096 map in float32 is 200 MB, and each operation on it would make another
@@ -103,12 +103,20 @@ def _complete_head(
         images.write_srgb(capture.picture("upscale", "before_and_after_completion"), picture)
     if not options.hair:
         return maps, None, {}
+    found, hairs = find_hair(capture, maps, surface, settings.seed, report)
+    return maps, found, hairs
+
+
+def find_hair(
+    capture: Capture, maps: HeadMaps, surface: HeadSurface, seed: int, report: Reporter
+) -> tuple[tuple[hair.Hair, np.ndarray, np.ndarray], dict[str, Strands]]:
+    """Return the hair's masks, the linear albedo without hair [S, S, 3] and where that differs [S, S]; single hairs."""
     report.progress(0, 1, "finding brows, lashes and beard")
     parts = read_parts(capture, surface.size)
     report.figure("hair_told_by", "strokes" if parts is None else "frames and strokes")
     masks = hair.find(maps, surface, parts, report.check)
     report.check()
-    cleaned, share = hair.clean(maps, masks, surface, settings.seed, report.check)
+    cleaned, share = hair.clean(maps, masks, surface, seed, report.check)
     for name in ("brows", "lashes", "beard"):
         report.figure(f"{name}_cm2", round(float((getattr(masks, name) * surface.texel**2).sum()) / 100, 2))
     behind = round(100 * float((masks.hidden * masks.brows).sum() / max(masks.brows.sum(), 1e-6)))
@@ -118,11 +126,11 @@ def _complete_head(
             f"Hair covers {behind} % of the brows: there they are grown like the other side, or as brows usually are."
         )
     picture = drawing.draw_masks(maps.diffuse, masks, cleaned)
-    images.write_srgb(capture.picture("upscale", "albedo_hair_skin_below"), picture)
+    images.write_srgb(capture.picture(report.stage, "albedo_hair_skin_below"), picture)
     report.progress(0, 1, "growing hair")
-    hairs = grooming.groom(maps, masks, cleaned, surface, settings.seed, check=report.check)
+    hairs = grooming.groom(maps, masks, cleaned, surface, seed, check=report.check)
     report.figure("hairs", sum(len(strands.points) for strands in hairs.values()))
-    return maps, (masks, cleaned, share), hairs
+    return (masks, cleaned, share), hairs
 
 
 def enlarged(

@@ -113,9 +113,12 @@ def groom(
     return hairs
 
 
-def write(path: Path, strands_of: dict[str, Strands]) -> None:
-    """Write an .npz: PART_points [M, K, 3] from the root and PART_radius [M, K], metres; linear PART_colour [M, 3]."""
-    arrays = {}
+def write(path: Path, strands_of: dict[str, Strands], others: dict[str, np.ndarray] | None = None) -> None:
+    """Write an .npz: PART_points [M, K, 3] from the root and PART_radius [M, K], metres; linear PART_colour [M, 3].
+
+    `others` are arrays of parts that are written already.
+    """
+    arrays = dict(others or {})
     for part, hairs in strands_of.items():
         arrays |= {f"{part}_points": hairs.points, f"{part}_radius": hairs.taper(), f"{part}_colour": hairs.colour}
     with replacing(path) as temporary, open(temporary, "wb") as file:

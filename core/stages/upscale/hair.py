@@ -54,7 +54,7 @@ def find(
     """
     channels, _ = apart(maps)
     light = channels[..., :3].mean(2)
-    zones, texel = _zones(surface), float(np.median(surface.texel))
+    zones, texel = find_zones(surface), float(np.median(surface.texel))
     check()
     grown = growth.find(light, maps.seen, zones, surface, part_shares)
     check()
@@ -76,7 +76,7 @@ def clean(
     0 leaves the albedo's bytes. The seed is that of the painted grain.
     """
     channels, slopes = apart(maps)
-    zones, texel = _zones(surface), float(np.median(surface.texel))
+    zones, texel = find_zones(surface), float(np.median(surface.texel))
     share = np.zeros_like(hair.brows)
     for cover, width in ((hair.brows, 1.2), (hair.lashes, 0.6), (hair.beard, 3.0)):
         near = cv2.GaussianBlur(cover, (0, 0), width / texel)
@@ -115,20 +115,26 @@ def write(
     """
     size = len(albedo)
     for name in ("brows", "lashes", "beard"):
-        images.write_data(folder / f"{name}.png", _enlarged(getattr(hair, name), size), check=check)
-    below, share = images.linear_to_srgb(cleaned), _enlarged(share, size)[..., None]
-    large = _enlarged(below, size)
+        images.write_data(folder / f"{name}.png", enlarge(getattr(hair, name), size), check=check)
+    images.write_srgb(folder / "clean_albedo.png", lay_clean(albedo, cleaned, share), bits=16, check=check)
+
+
+def lay_clean(albedo: np.ndarray, cleaned: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Return an albedo [L, L, 3], sRGB, with the cleaned linear one [S, S, 3] over it by its share [S, S]."""
+    size = len(albedo)
+    large = enlarge(images.linear_to_srgb(cleaned), size)
     large -= albedo
-    large *= share
+    large *= enlarge(share, size)[..., None]
     large += albedo
-    images.write_srgb(folder / "clean_albedo.png", large, bits=16, check=check)
+    return large
 
 
-def _enlarged(picture: np.ndarray, size: int) -> np.ndarray:
+def enlarge(picture: np.ndarray, size: int) -> np.ndarray:
+    """Return [S, S(, C)] at a larger size, linear between texels."""
     return cv2.resize(picture, (size, size), interpolation=cv2.INTER_LINEAR)
 
 
-def _zones(surface: HeadSurface) -> dict[str, np.ndarray]:
+def find_zones(surface: HeadSurface) -> dict[str, np.ndarray]:
     """Return where brows, lashes and beard may grow, [S, S] in [0, 1] each."""
     points = template.landmark_points(surface.mesh)
     size, position = surface.size, surface.position

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from core.capture import stages
+from core.capture import retouch_edits, retouch_layers, stages
 from core.capture.capture import Capture
 from core.capture.files import replacing
 from core.capture.hashes import read_hash
@@ -42,6 +42,7 @@ OTHER = {
     "texture": {"size": 288},
     "shadow_mask": {"sensitivity": 0.8},
     "solve": {"steps": 5},
+    "retouch": {"size": 1024},
     "upscale": {"hair": False},
     "transfer": {"scan_size": 288},
 }
@@ -64,6 +65,8 @@ GUESTS = {
 }
 """User's files in the folder of a delivery."""
 BESIDE = "anna.txt"
+LAYER = "Spot"
+"""Name of the artist's layer."""
 
 
 @dataclass
@@ -180,7 +183,7 @@ def delivery_folders(place: Path) -> list[Path]:
 
 
 def _plant(place: Path) -> None:
-    """Make a new capture with the user's files and two painted masks in it."""
+    """Make a new capture with the user's files, two painted masks and a layer in it."""
     capture = capture_at(place)
     place.mkdir(parents=True)
     (place / BESIDE).write_bytes(STRANGERS["shopping.txt"])
@@ -190,6 +193,20 @@ def _plant(place: Path) -> None:
         (capture.root / name).write_bytes(content)
     for path, shift in ((capture.shadow_mask, 0), (capture.protect_mask, 9)):
         in_fork(lambda path=path, shift=shift: _paint(path, shift))
+    layer = retouch_edits.add_layer(capture, LAYER, "albedo")
+    in_fork(lambda: _paint_layer(retouch_layers.picture_of(capture, layer)))
+
+
+def _paint_layer(path: Path) -> None:
+    """Write a layer with a dark spot on a cheek, 256 x 256."""
+    import numpy as np
+
+    from core.imaging import images
+
+    row, column = np.mgrid[:256, :256] / 256
+    spot = np.hypot(row - 0.62, column - 0.3) < 0.03
+    with replacing(path) as temporary:
+        images.write_packed(temporary, np.stack([0.3 * spot, 0.2 * spot, 0.15 * spot, spot], 2), bits=16, srgb=True)
 
 
 def _paint(path: Path, shift: int) -> None:

@@ -25,7 +25,7 @@ from core.worker.job import write_job
 from ..figures import ROOT
 from ..same_maps import written
 from . import disk, judge
-from .capture import DELIVERY, GUESTS, Undisturbed, capture_at, copy_place, delivery_folders, start_job
+from .capture import DELIVERY, GUESTS, LAYER, Undisturbed, capture_at, copy_place, delivery_folders, start_job
 from .worker import Forked, Moment, fork_worker, in_fork, running_at
 
 SHORT_TERM_S = 1.0
@@ -35,7 +35,7 @@ LATE_S = 0.03
 ROOM, PAGE = 64 << 20, 4096
 SPARE = 1.2
 """Share of a stage's files that it may need on the way: some are written twice."""
-MASKS = {'SHADOW': "shadow_mask.png", 'PROTECT': "protect_mask.png"}
+MASKS = {'SHADOW': "shadow_mask.png", 'PROTECT': "protect_mask.png", 'LAYER': f"retouch/{LAYER}.png"}
 MASK_SIDE, SAVES, SAVE_CHANGES = 1024, 3, 34
 """Side of a painted mask, how often it is saved, and about how many changes that makes."""
 COLMAP_S, PARTING_S = 2.5, 5.0
@@ -208,11 +208,11 @@ def at_once(trial: KillTrial) -> None:
 
 
 def saving(trial: KillTrial) -> None:
-    """Kill the add-on while it saves a mask several times, in half of the trials beside a worker.
+    """Kill the add-on while it saves a mask or a layer several times, in half of the trials beside a worker.
 
-    The mask is the old one or one of the new, and the old one is in the history where it was replaced.
+    It is the old one or one of the new, and the old one is in the history where it was replaced.
     """
-    # no mask is an input of these stages
+    # neither is an input of these stages
     early = trial.undisturbed.names[: stages.NAMES.index(stages.MASK_STAGE) + 1]
     stage, which, busy = trial.rng.choice(early), trial.rng.choice(list(MASKS)), trial.chance()
     copy_place(trial.undisturbed.folder / "end", trial.place)
@@ -220,9 +220,10 @@ def saving(trial: KillTrial) -> None:
     mask = capture.root / name
     old = mask.read_bytes()
     moment = Moment(write=trial.rng.randint(1, SAVE_CHANGES), late_s=trial.rng.choice((0.0, trial.rng.random() / 100)))
-    trial.where = f"{which.lower()} mask, {moment}{f', while {stage} is run' if busy else ''}"
+    trial.where = f"{name}, {moment}{f', while {stage} is run' if busy else ''}"
     seed = trial.rng.randrange(2**31)
-    addon = Forked(lambda: _save_masks(capture.root, which, seed, painted), trial.place, trial.beside("addon"), moment)
+    save = partial(_save_paintings, capture.root, which, seed, painted)
+    addon = Forked(save, trial.place, trial.beside("addon"), moment)
     if busy:
         wait_until(lambda: painted.is_dir() or addon.ended(), 60)
         worker = start_job(trial.place, **trial.undisturbed.job(stage))
@@ -237,29 +238,38 @@ def saving(trial: KillTrial) -> None:
         trial.judge_kill(masks=masks)
     trial.resume(stage, masks=masks)
     kept = [path.read_bytes() for path in capture.mask_history.glob("*.png")]
-    trial.check(mask.read_bytes() == old or old in kept, "the mask that was there before is not in the history")
-    trial.check(all(content in contents for content in kept), "the history has an incomplete mask")
+    trial.check(mask.read_bytes() == old or old in kept, "what was there before is not in the history")
+    trial.check(all(content in contents for content in kept), "the history has an incomplete file")
 
 
-def _save_masks(root: Path, mask_kind: str, seed: int, painted: Path) -> None:
-    """Save masks as the add-on does after strokes; copies of what the files must hold go to `painted` first."""
+def _save_paintings(root: Path, which: str, seed: int, painted: Path) -> None:
+    """Save masks or layers as the add-on does after strokes; copies of the files' contents go to `painted` first."""
     import numpy as np
 
     spec = spec_from_file_location("wildcap", ROOT / "__init__.py", submodule_search_locations=[str(ROOT)])
     sys.modules["wildcap"] = module_from_spec(spec)
     spec.loader.exec_module(sys.modules["wildcap"])
-    keeping = importlib.import_module("wildcap.wildcap_addon.paint.keeping")
-    mask_image = importlib.import_module("wildcap.wildcap_addon.paint.mask_image")
+    keeping, mask_image, mask_painting, layer_painting = (
+        importlib.import_module(f"wildcap.wildcap_addon.paint.{name}")
+        for name in ("keeping", "mask_image", "mask_painting", "layer_painting")
+    )
     capture = importlib.import_module("wildcap.core.capture.capture").Capture(root)
     rng, half = np.random.default_rng(seed), painted.with_suffix(".half")
-    masks = [rng.random((MASK_SIDE, MASK_SIDE), np.float32) for _ in range(SAVES)]
+    canvases = [rng.random((MASK_SIDE, MASK_SIDE, 4), np.float32) for _ in range(SAVES)]
+    if which == 'LAYER':
+        painting = layer_painting.LayerPainting(capture, f"{LAYER}.png", MASK_SIDE)
+        painting.begin(np.zeros((MASK_SIDE, MASK_SIDE, 3), np.float32), b"small")
+        contents = [painting.encode(canvas) for canvas in canvases]
+    else:
+        painting = mask_painting.MaskPainting(capture, which)
+        contents = [mask_image.grey_png(mask_image.from_top(canvas)) for canvas in canvases]
     half.mkdir()
-    for number, mask in enumerate(masks):
-        (half / f"{number}.png").write_bytes(mask_image.grey_png(mask))
+    for number, content in enumerate(contents):
+        (half / f"{number}.png").write_bytes(content)
     half.rename(painted)
     stamp = ()
-    for mask in masks:
-        stamp = keeping.store_painting(mask, capture, mask_kind, stamp)
+    for canvas in canvases:
+        stamp = keeping.store_painting(canvas, painting, stamp)
 
 
 def delivering(trial: KillTrial) -> None:

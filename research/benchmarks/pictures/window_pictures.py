@@ -47,6 +47,7 @@ PICTURES = {
     "solve_running": WindowPicture(("6_solve_running",), 1280),
     "compare": WindowPicture(("compare_filmed", "compare_delit", "compare_solved"), 320, (HEAD,)),
     "skin_tone": WindowPicture(("skin_tone_3_undone", "skin_tone_2_swatch_8"), 420, (HEAD_AND_TAB,)),
+    "retouch": WindowPicture(("retouch_painted", "retouch_healed"), 560, (HEAD_AND_TAB,)),
     "panels": WindowPicture(("panels",), 1076),
     "install": WindowPicture(("set_up_1_asked", "set_up_2_installing"), 640, (QUESTION, PANEL)),
     "walk_1": WindowPicture(("1_new",), 640),

@@ -57,6 +57,12 @@ def keys(core: Path) -> dict[str, str]:
     return {stage.name: code_key.code_key(stage.module, core) for stage in stages.STAGES}
 
 
+def place_of(module: str) -> Path:
+    """The file of a module, or of a package."""
+    folder = CORE.joinpath(*module.split(".")[1:])
+    return folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
+
+
 def imported_files(path: Path) -> list[Path]:
     files = [folder / "__init__.py" for folder in path.parents if CORE in folder.parents]
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -71,7 +77,7 @@ def test_the_closure_is_all_that_a_stage_imports_however_far_away():
     """By another reading than the key's, and colmap.py, which is run as a process of its own."""
     imported = cache(imported_files)
     for stage in stages.STAGES:
-        closure, waiting = set(), [CORE.joinpath(*stage.module.split(".")[1:], "__init__.py")]
+        closure, waiting = set(), [place_of(stage.module)]
         while waiting:
             path = waiting.pop()
             if path not in closure and path != CORE / "__init__.py":
@@ -90,10 +96,10 @@ def test_the_closure_is_all_that_a_stage_imports_however_far_away():
         ("stages/cameras/colmap.py", {"cameras"}),
         ("__init__.py", set()),
         ("worker/runner.py", set()),
-        ("weights/tones.json", {"solve", "upscale"}),
-        ("weights/upscaler.safetensors", {"upscale"}),
+        ("weights/tones.json", {"solve", "upscale", "retouch"}),
+        ("weights/upscaler.safetensors", {"upscale", "retouch"}),
         ("weights/delighter.safetensors", {"delight"}),
-        ("weights/prior.safetensors", {"solve", "upscale"}),
+        ("weights/prior.safetensors", {"solve", "upscale", "retouch"}),
     ],
 )
 def test_an_edit_changes_exactly_the_stages_that_depend_on_the_file(copy, before, file, expected):

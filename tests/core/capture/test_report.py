@@ -67,8 +67,8 @@ def capture(tmp_path) -> Capture:
 def test_the_page_shows_every_stage_with_state_pictures_and_figures(capture):
     text = _page_text(capture)
     page = Page(text)
-    assert [section["id"] for section in page.attributes("section") if "id" in section] == list(stages.NAMES)
-    states = ["done", "stale"] + ["to-do"] * (len(stages.STAGES) - 2)
+    assert [section["id"] for section in page.attributes("section") if "id" in section] == list(stages.ALWAYS)
+    states = ["done", "stale"] + ["to-do"] * (len(stages.ALWAYS) - 2)
     shown = [a["class"] for a in page.attributes("small")]
     assert shown == states, "features is auto again, so cameras are out of date"
     texts = {"0.9688", "registered share", "a, 1.5, -", "0001: yes", "skin", "around the head", "three lights"}
@@ -80,7 +80,7 @@ def test_the_page_shows_every_stage_with_state_pictures_and_figures(capture):
 
 
 def test_a_capture_without_anything_has_a_page_too(tmp_path):
-    assert f"0 of {len(stages.STAGES)} stages finished" in _page_text(Capture(tmp_path / "new.wildcap"))
+    assert f"0 of {len(stages.ALWAYS)} stages finished" in _page_text(Capture(tmp_path / "new.wildcap"))
 
 
 def test_findings_of_all_stages_and_what_stopped_it_come_first(capture):

@@ -36,8 +36,8 @@ def capture(tmp_path, monkeypatch) -> Capture:
 
 def test_a_job_runs_every_stage_in_order_and_a_second_run_skips_them(capture, video):
     messages = run_here(capture, source=video)
-    assert finished(messages) == dict.fromkeys(stages.NAMES, False) and isinstance(messages[-1], Done)
-    assert list(finished(messages)) == list(stages.NAMES)
+    assert finished(messages) == dict.fromkeys(stages.ALWAYS, False) and isinstance(messages[-1], Done)
+    assert list(finished(messages)) == list(stages.ALWAYS)
     assert capture.read()["stages"]["solve"]["figures"] == {"size_px": 64}
     assert "4K Maps" in capture.report.read_text(encoding="utf-8")
     before = contents(capture)

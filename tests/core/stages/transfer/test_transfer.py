@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from core.capture import stages
+from core.capture import retouch_edits, retouch_layers, stages
 from core.capture.capture import Capture
 from core.capture.messages import CancelledError, Problem, Reporter
 from core.geometry import atlas, baking, meshes, raster, surfaces
@@ -21,6 +21,7 @@ from core.imaging import images
 from core.settings.settings import from_json
 from core.stages import transfer
 from core.stages.transfer import scan
+from tests.fixtures import recorded
 from tests.fixtures.egg import egg
 from tests.fixtures.photographed_head import capture_of, head, skin
 
@@ -206,6 +207,26 @@ def test_tiles_of_the_artists_mesh_are_baked_and_named(capture, target):
     assert images.read_mask(capture.delivery / "own_confidence.1002.png").max() > 0.5
     weight = images.read_mask(capture.delivery / "own_skin_weight.1002.png")
     assert weight.max() > 0.99 and weight.min() < 0.01, "skin, and brows or what has no partner"
+
+
+def test_what_was_retouched_is_baked_into_the_artists_mesh(capture, target):
+    meshes.write_obj(capture.own_head, target)
+    capture.own_head_skin.write_text(json.dumps({"skin_triangles": [[0, len(target.faces)]]}))
+    capture.json.write_text('{"format": 2, "source": "", "stages": {}}', encoding="utf-8")
+    for folder in (capture.maps_4k, capture.maps_retouched):
+        shutil.copytree(capture.maps, folder)
+    layer = retouch_edits.add_layer(capture, "Blue", "albedo")
+    images.write_packed(retouch_layers.picture_of(capture, layer), np.ones((256, 256, 4), np.float32), bits=16)
+    blue = np.broadcast_to(np.float32([0.02, 0.03, 0.6]), (256, 256, 3))
+    images.write_linear(capture.maps_retouched / "diffuse_albedo.exr", blue)
+    for name in ("upscale", "retouch"):
+        recorded.record(capture, stages.by_name(name), settings_of())
+    report = Reporter("transfer")
+    transfer.run(capture, settings_of(scan=False), report)
+    assert report.figures["maps_from"] == "maps_retouched"
+    baked = images.read_linear(capture.delivery / "own_diffuse_albedo.1001.png")
+    known = images.read_mask(capture.delivery / "own_confidence.1001.png") > 0.1
+    assert known.any() and np.abs(baked[known] - (0.02, 0.03, 0.6)).max() < 4e-3
 
 
 def test_nothing_half_done_stays_and_without_a_scan_there_is_still_a_delivery(capture):
