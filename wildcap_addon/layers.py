@@ -20,6 +20,10 @@ from .batch_watch import modified_ns
 
 FIELDS = ("name", "visible", "opacity", "locked")
 """What a row sets."""
+DECIMALS = 4
+"""Of an opacity."""
+SHOWN = ("file", "map", *FIELDS)
+"""What it shows."""
 _stamps: dict[str, int] = {}  # capture folder -> time of the list that its rows show
 _is_quiet = False
 
@@ -30,7 +34,7 @@ def hand_on(row, item) -> None:
         return
     capture = captures.folder(item)
     try:
-        layer = retouch_edits.change_layer(capture, row.file, **{name: getattr(row, name) for name in FIELDS})
+        layer = retouch_edits.change_layer(capture, row.file, **_values(row, FIELDS))
     except Problem as problem:
         problems.show(captures.root(item), problem)
         return
@@ -56,17 +60,24 @@ def show(item) -> None:
     except Problem as problem:
         problems.show(captures.root(item), problem)
         return
+    wanted = [_values(layer, SHOWN) for layer in reversed(layers)]
     active = active_file(item)
-    with _quiet():
-        item.layers.clear()
-        for layer in reversed(layers):
-            row = item.layers.add()
-            row.file, row.map = layer.file, layer.map
-            for name in FIELDS:
-                setattr(row, name, getattr(layer, name))
-        files = [row.file for row in item.layers]
-        item.active_layer = files.index(active) if active in files else 0
+    if wanted != [_values(row, SHOWN) for row in item.layers]:
+        with _quiet():
+            item.layers.clear()
+            for values in wanted:
+                row = item.layers.add()
+                for name, value in values.items():
+                    setattr(row, name, value)
+            files = [row.file for row in item.layers]
+            item.active_layer = files.index(active) if active in files else 0
     _stamps[captures.root(item)] = modified_ns(captures.folder(item).retouch_layers)
+
+
+def _values(row, names: tuple[str, ...]) -> dict:
+    """Return fields of a row or of a layer; a row holds its opacity in single precision."""
+    values = {name: getattr(row, name) for name in names}
+    return {name: round(value, DECIMALS) if isinstance(value, float) else value for name, value in values.items()}
 
 
 def active_file(item) -> str:

@@ -156,11 +156,14 @@ def test_rows_and_list_say_the_same(capture, face, layers, addon):
         core.add_layer(folder, name, "albedo")
     assert layers.take_in(face) and not layers.take_in(face)
     assert [row.name for row in face.layers] == ["Scar", "Mole"]
-    face.layers[0].opacity, face.layers[0].locked, face.layers[1].visible = 0.5, True, False
+    face.layers[0].opacity, face.layers[0].locked, face.layers[1].visible = 0.9, True, False
     face.layers[1].name = "Scar"
     assert face.layers[1].name == "Scar.001"
     there = {entry["name"]: entry for entry in entries(capture)}
-    assert there["Scar"]["opacity"] == 0.5 and there["Scar"]["locked"] and not there["Scar.001"]["visible"]
+    assert there["Scar"]["opacity"] == 0.9 and there["Scar"]["locked"] and not there["Scar.001"]["visible"]
+    before = (capture / "retouch" / "layers.json").stat().st_mtime_ns
+    layers._after_undo()
+    assert (capture / "retouch" / "layers.json").stat().st_mtime_ns == before, "nothing was undone"
     face.active_layer = 0
     bpy.ops.wildcap.layer_move(up=False)
     assert [row.name for row in face.layers] == ["Scar.001", "Scar"] and layers.active_file(face) == "Scar.png"
