@@ -84,7 +84,7 @@ def _lay_over_albedo(
     mine = [layer for layer in layers if layer.map == "albedo"]
     if not mine:
         for name in (MAPS["albedo"], linear_name):
-            shutil.copyfile(capture.maps_4k / name, folder / name)
+            _copy_map(capture, name, folder)
         return None, None
     albedo = images.read_srgb(capture.maps_4k / MAPS["albedo"])
     cover = np.zeros(albedo.shape[:2], np.float32)
@@ -100,12 +100,18 @@ def _lay_over_albedo(
     return albedo, cover
 
 
+def _copy_map(capture: Capture, name: str, folder: Path) -> None:
+    """Copy a map of maps_4k as it is. Raises Problem if it is damaged: a copy would pass that on."""
+    images.read_data(capture.maps_4k / name)
+    shutil.copyfile(capture.maps_4k / name, folder / name)
+
+
 def _lay_over_data(capture: Capture, layers: tuple[Layer, ...], folder: Path, report: Reporter) -> None:
     """Write the specular and the normal map; one without layers is copied."""
     for i, name in enumerate(("specular", "normal")):
         mine = [layer for layer in layers if layer.map == name]
         if not mine:
-            shutil.copyfile(capture.maps_4k / MAPS[name], folder / MAPS[name])
+            _copy_map(capture, MAPS[name], folder)
             continue
         report.progress(5 + i, 10, f"laying layers over the {name} map")
         data = images.read_data(capture.maps_4k / MAPS[name])[..., : 3 if name == "normal" else 1]
@@ -154,10 +160,11 @@ def _write_hair(
     capture: Capture, folder: Path, albedo: np.ndarray | None, cover: np.ndarray | None, found, report: Reporter
 ) -> None:
     """Write masks, the albedo without hair and strands: as found anew, else those of maps_4k with the layers' skin."""
-    names = [*HAIR_MASKS, STRANDS, *([CLEAN] if albedo is None else [])]
-    for name in names:
+    for name in (*HAIR_MASKS, *([CLEAN] if albedo is None else [])):
         if (capture.maps_4k / name).is_file():
-            shutil.copyfile(capture.maps_4k / name, folder / name)
+            _copy_map(capture, name, folder)
+    if (capture.maps_4k / STRANDS).is_file():
+        shutil.copyfile(capture.maps_4k / STRANDS, folder / STRANDS)
     if albedo is None or not (capture.maps_4k / CLEAN).is_file():
         return
     clean, before = (images.read_srgb(capture.maps_4k / name) for name in (CLEAN, MAPS["albedo"]))

@@ -23,6 +23,7 @@ from core.stages.upscale import retouch
 from tests.fixtures import recorded
 from tests.fixtures.delivered import HEAD
 from tests.fixtures.hairy_head import painted
+from tests.fixtures.refused import refused
 
 LARGE = 1024
 TONE = (0.7, 0.55, 0.45)
@@ -181,3 +182,12 @@ def test_a_layer_whose_picture_is_gone_is_told(capture):
     layer = add(capture, CHEEK)
     retouch_layers.picture_of(capture, layer).unlink()
     assert "missing" in run(capture).findings[0]["problem"] and not capture.maps_retouched.exists()
+
+
+@pytest.mark.parametrize("name", ["normal.png", "specular_albedo.png", "brows.png", "diffuse_albedo.exr"])
+def test_a_damaged_map_is_refused_by_name_and_not_copied(capture, name):
+    add(capture, CHEEK)
+    path = capture.maps_4k / name
+    path.write_bytes(path.read_bytes()[:-40])
+    refused(lambda: run(capture), name)
+    assert not capture.maps_retouched.exists()
