@@ -19,6 +19,7 @@ from pathlib import Path
 from core.capture import stages
 from core.capture.delivery_plan import PROVENANCE
 from core.capture.messages import Done, Failed
+from core.capture.retouch_layers import read_layers
 from core.worker.client import Worker
 from core.worker.job import write_job
 
@@ -231,12 +232,15 @@ def saving(trial: KillTrial) -> None:
     trial.check(addon.code <= 0, f"the add-on could not save: {addon.errors[-400:]}")
     contents = (old, *(path.read_bytes() for path in sorted(painted.glob("*.png"))))
     masks = {name: contents}
+    # the list of layers and the small picture come with the layer
+    beside = {"unlike": (f"retouch/{LAYER}.below", "retouch/layers.json")} if which == 'LAYER' else {}
+    trial.check(len(read_layers(capture)) == 1, "the list of layers is damaged")
     if busy:
         ended = worker.wait()
         trial.check(isinstance(ended, Done), f"the worker beside the add-on ended with {ended}")
     else:
-        trial.judge_kill(masks=masks)
-    trial.resume(stage, masks=masks)
+        trial.judge_kill(masks=masks, **beside)
+    trial.resume(stage, masks=masks, **beside)
     kept = [path.read_bytes() for path in capture.mask_history.glob("*.png")]
     trial.check(mask.read_bytes() == old or old in kept, "what was there before is not in the history")
     trial.check(all(content in contents for content in kept), "the history has an incomplete file")
