@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Select the maps for the material: with the artist's layers, at 4K, or as solved, whichever is of the newest solve.
-
-No stage imports this module, so changing it makes no stage older.
-"""
+"""Select the maps for the material: with the artist's layers, at 4K, or as solved, whichever is newest."""
 
 from __future__ import annotations
 

@@ -124,7 +124,7 @@ def _write_maps(
 def _toned(capture: Capture, paths: dict[str, Path], change: ToneChange, on_head: bool) -> dict[str, maps.Toned]:
     """Return what follows a change of the skin tone: the albedo by the weight of skin, and that without hair."""
     if on_head:
-        weights = {"albedo": partial(read_skin_weight, capture), "clean": read_bare_weight}
+        weights = {"albedo": partial(read_skin_weight, capture), "clean": partial(read_bare_weight, capture)}
     else:
         weights = {"albedo": partial(_read_weight, paths["skin_weight"])}
     return {name: maps.Toned(change.gain, weight) for name, weight in weights.items()}

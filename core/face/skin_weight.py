@@ -19,6 +19,8 @@ from ..imaging import images
 from ..settings.colour_values import TONE_DECIMALS, Colour, to_linear
 from . import template
 
+LOCKED = "locked.png"
+"""Beside the weight: where locked layers of the artist cover; absent without any."""
 SKIN_SHARE = 0.9  # of the template's mask from which a texel is skin
 
 
@@ -73,9 +75,14 @@ def read_solved_weight(capture: Capture, size: int) -> np.ndarray:
     return images.resize(weight, size, size).clip(0, 1)
 
 
-def read_bare_weight(size: int) -> np.ndarray:
-    """Return the weight of the albedo without hair, float32 [size, size]: where hair was, there is skin."""
-    return _without_lips(size)
+def read_bare_weight(capture: Capture, size: int) -> np.ndarray:
+    """Return the weight of the albedo without hair, float32 [size, size]: where hair was, there is skin.
+
+    Locked layers of the newest maps do not follow either.
+    """
+    locked = find_skin_weight(capture).with_name(LOCKED)
+    kept = images.resize(images.read_mask(locked), size, size).clip(0, 1) if locked.is_file() else 0
+    return _without_lips(size) * (1 - np.float32(kept))
 
 
 def _read_albedo(capture: Capture) -> np.ndarray:

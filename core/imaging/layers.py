@@ -61,14 +61,15 @@ def lay_over(below: np.ndarray, layer: np.ndarray, opacity: float = 1.0) -> tupl
 
     Where the cover is 0, the map's values stay to the last bit.
     """
-    size = len(below)
-    large = resize_layer(layer, size)
-    colours = large[..., :3] if below.shape[2] == 3 else large[..., :3].mean(2, keepdims=True)
-    cover = np.float32(opacity) * large[..., 3:]
-    if len(layer) < size:  # what the layer's own texels are too coarse to show
-        colours = colours + below - _resized(_resized(below, len(layer)), size)
-    result = below + cover * (colours.clip(0, 1) - below)
-    return np.where(cover > 0, result, below), cover[..., 0]
+    size, opacity = len(below), np.float32(opacity)
+    own = resize_layer(layer, size) if len(layer) > size else layer
+    colours = own[..., :3] if below.shape[2] == 3 else own[..., :3].mean(2, keepdims=True)
+    seen = below if len(own) == size else _resized(below, len(own))
+    change, cover = own[..., 3:] * (colours - seen), own[..., 3:]
+    if len(own) < size:  # the change is enlarged, so that what its texels are too coarse to show stays
+        change, cover = _resized(change, size), _resized(cover, size)
+    result = (below + opacity * change).clip(0, 1)
+    return np.where(cover > 0, result, below), opacity * cover[..., 0]
 
 
 def _resized(picture: np.ndarray, size: int) -> np.ndarray:

@@ -16,6 +16,7 @@ from ..capture.capture import Capture
 from ..capture.files import replacing
 from ..capture.messages import Problem, Reporter
 from ..capture.retouch_layers import MAPS, Layer, below_of, picture_of
+from ..settings.colour_values import to_linear
 from ..settings.settings import Settings
 from . import images
 from .layers import check_shape, lay_over, read_layer
@@ -54,11 +55,14 @@ def import_layer(
 
 
 def keep_as_it_is(capture: Capture, layer: Layer) -> Layer:
-    """Take what is below now as what the layer was painted over; return the layer."""
+    """Take what is below now as what the layer was painted over; return the layer, whose own tone stays."""
     small = images.resize(images.read_linear(capture.maps / MAPS["albedo"]), BELOW_SIDE, BELOW_SIDE)
-    images.write_srgb(below_of(capture, layer), images.linear_to_srgb(small))
     solved = tone_choice.read_solved_tone(capture.read())
-    return retouch_edits.change_layer(capture, layer.file, tone=None if solved is None else solved.solved)
+    now = None if solved is None else solved.solved
+    if None not in (layer.tone, now):  # the picture is in the layer's tone
+        small = small * (np.array(to_linear(layer.tone)) / to_linear(now)).astype(np.float32)
+    images.write_srgb(below_of(capture, layer), images.linear_to_srgb(small.clip(0, 1)))
+    return retouch_edits.change_layer(capture, layer.file, tone=layer.tone or now)
 
 
 def export_layer(capture: Capture, layer: Layer, to: Path, below: bool = False) -> None:

@@ -224,8 +224,10 @@ class LayerPainting:
 
 def keep_as_it_is(capture: Capture, layer: Layer) -> None:
     """Take what is below now as what the layer was painted over. Raises Problem if it cannot be written."""
-    layer = retouch_edits.change_layer(capture, layer.file, tone=_shown_tone(capture))
-    mask_image.write(retouch_layers.below_of(capture, layer), _encode_below(capture))
+    shown = _shown_tone(capture)
+    gain = None if None in (layer.tone, shown) else np.array(to_linear(layer.tone)) / to_linear(shown)
+    layer = retouch_edits.change_layer(capture, layer.file, tone=layer.tone or shown)
+    mask_image.write(retouch_layers.below_of(capture, layer), _encode_below(capture, gain))
 
 
 def load_picture(path: Path) -> np.ndarray:
@@ -268,10 +270,14 @@ def _toned(capture: Capture, stored: np.ndarray) -> np.ndarray:
     return np.asarray(colours.linear_to_srgb(linear), np.float32)
 
 
-def _encode_below(capture: Capture) -> bytes:
-    """Return the small picture of the solved albedo, 8 bits of sRGB, in the tone that the head shows."""
+def _encode_below(capture: Capture, gain: np.ndarray | None = None) -> bytes:
+    """Return the small picture of the solved albedo, 8 bits of sRGB, in the tone that the head shows.
+
+    A linear gain [3] brings it to another one.
+    """
     stored = load_picture(capture.maps / retouch_layers.MAPS["albedo"])[..., :3]
     linear = layer_pixels.resized(colours.srgb_to_linear(_toned(capture, stored)), BELOW_SIDE)
+    linear = linear if gain is None else (linear * gain).clip(0, 1)
     return png.encode(np.round(255 * np.flipud(colours.linear_to_srgb(linear)).clip(0, 1)).astype(np.uint8))
 
 

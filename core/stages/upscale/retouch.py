@@ -25,7 +25,7 @@ from ...capture.skin_regions import HAIR_MASKS, HAIR_ZONE
 from ...capture.stages import STRANDS
 from ...capture.toned_albedo import apply_tone
 from ...face.head import read_head
-from ...face.skin_weight import measure_tone, read_solved_weight, weigh_layer, weigh_skin
+from ...face.skin_weight import LOCKED, measure_tone, read_solved_weight, weigh_layer, weigh_skin
 from ...face.strands import Strands
 from ...imaging import images
 from ...imaging.layers import lay_over, read_layer, resize_layer
@@ -205,6 +205,9 @@ def _write_skin_weight(capture: Capture, layers: tuple[Layer, ...], tone: Colour
         (masks, _, _), _, touched = found
         zone = np.maximum.reduce([images.resize(getattr(masks, name), size, size) for name in touched])
     anew = weigh_skin(images.srgb_to_linear(shown), np.array(to_linear(tone)), (zone / HAIR_ZONE).clip(0, 1))
+    kept = [cover for cover, locked in covers if locked]
+    if kept:
+        images.write_data(folder / LOCKED, np.maximum.reduce(kept))
     for cover, locked in covers:
         weight = weight + cover * ((0 if locked else anew) - weight)
     images.write_data(folder / capture.skin_weight.name, weight.clip(0, 1))

@@ -125,5 +125,5 @@ def test_an_older_solve_is_weighed_by_the_template_and_its_masks_of_hair(capture
     images.write_srgb(capture.maps / "diffuse_albedo.png", images.linear_to_srgb(albedo.astype(np.float32)), 16)
     capture.maps_4k.mkdir()
     images.write_data(capture.maps_4k / "beard.png", beard)
-    weight, bare = skin_weight.read_skin_weight(capture, SIDE), skin_weight.read_bare_weight(SIDE)
+    weight, bare = skin_weight.read_skin_weight(capture, SIDE), skin_weight.read_bare_weight(capture, SIDE)
     assert weight[14:].max() < 0.1 and bare[14:, 0].min() > 0.99 and weight[:11, 0].min() > 0.99, "dark skin is no hair"

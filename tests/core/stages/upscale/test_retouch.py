@@ -13,7 +13,7 @@ from core.capture import retouch_edits, retouch_layers, stages
 from core.capture.capture import Capture
 from core.capture.messages import Reporter
 from core.face import template
-from core.face.skin_weight import read_skin_weight
+from core.face.skin_weight import read_bare_weight, read_skin_weight
 from core.imaging import images
 from core.imaging.retouch_import import keep_as_it_is
 from core.settings.colour_values import to_linear
@@ -151,6 +151,8 @@ def test_a_layer_moves_with_the_solved_tone_unless_it_is_locked(capture):
     assert np.allclose(images.read_linear(path)[634, 716], colour, atol=3e-3)
     weight = read_skin_weight(capture, LARGE)
     assert weight[634, 307] > 0.95 and weight[634, 716] < 0.05, "a later tone leaves the locked one alone"
+    bare = read_bare_weight(capture, LARGE)
+    assert bare[634, 307] > 0.95 and bare[634, 716] < 0.05, "without hair as well"
 
 
 def test_skin_that_has_changed_below_is_told_and_the_layer_kept(capture):
@@ -165,7 +167,7 @@ def test_skin_that_has_changed_below_is_told_and_the_layer_kept(capture):
     assert list(report.figures["retouch_changed"]) == [layer.file] != [other.file]
     assert report.figures["retouch_changed"][layer.file] > 3 and "Spot has changed" in report.findings[0]["problem"]
     assert np.abs(texel(capture.maps_retouched / "diffuse_albedo.png", CHEEK) - RED).max() < 0.03
-    keep_as_it_is(capture, layer)
+    assert keep_as_it_is(capture, layer).tone == TONE, "its colours stay"
     assert run(capture).figures["retouch_changed"] == {}
 
 
