@@ -12,7 +12,6 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.capture import retouch_edits, retouch_layers
-from ..core.capture.capture import Capture
 from ..core.capture.messages import Problem
 from ..core.capture.retouch_layers import Layer
 from . import captures, problems
@@ -98,14 +97,6 @@ def choose(item, file: str) -> None:
     """Make the layer of a file the active one."""
     show(item)
     item.active_layer = next((i for i, row in enumerate(item.layers) if row.file == file), 0)
-
-
-def has_shown(capture: Capture) -> bool:
-    """Return whether layers change the capture's maps."""
-    try:
-        return bool(retouch_layers.read_shown(capture))
-    except Problem:
-        return False
 
 
 @contextmanager

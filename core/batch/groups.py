@@ -35,7 +35,7 @@ GROUPS = (
     StageGroup("head", "Head", "frames", "registration", 2.0),
     StageGroup("mask", "Mask", "delight", MASK_STAGE, 3.0, on_device=True),
     StageGroup(GATE, "Solve", "solve", "upscale", 5.0, on_device=True),
-    StageGroup(DELIVER, "Deliver", "transfer", "transfer", 2.0),
+    StageGroup(DELIVER, "Deliver", "retouch", "transfer", 3.0),
 )
 
 

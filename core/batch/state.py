@@ -13,6 +13,7 @@ from ..capture.files import storage_problem
 from ..capture.freshness import FINISHED
 from ..capture.json_files import read_json
 from ..capture.messages import Problem
+from ..capture.newest_maps import find_newest_maps
 from ..settings.settings import from_json, to_json
 from .gate import is_accepted
 from .groups import DELIVER, GATE, GROUPS, StageGroup
@@ -114,6 +115,6 @@ def is_delivered(batch: Batch, face: BatchFace) -> bool:
 
 def has_sheet(capture: Capture) -> bool:
     """Return whether there is a contact sheet that is not older than the maps and the skin tone it shows."""
-    sheet, maps = capture.renders / SHEET, capture.maps_4k / "diffuse_albedo.png"
+    sheet, maps = capture.renders / SHEET, find_newest_maps(capture)[0]
     shown = [maps, *(path for path in (capture.skin_tone,) if path.is_file())]
     return sheet.is_file() and maps.is_file() and sheet.stat().st_mtime >= max(path.stat().st_mtime for path in shown)

@@ -15,6 +15,8 @@ from .capture import Capture
 from .files import replacing
 
 KEPT_MASKS = 10
+STAMP = re.compile(r"_(\d{8}_\d{6})_(\d{3})$")
+"""Date and time at the end of a copy's name."""
 
 
 def keep(capture: Capture, mask: Path, content: bytes | None = None) -> Path | None:
@@ -25,7 +27,12 @@ def keep(capture: Capture, mask: Path, content: bytes | None = None) -> Path | N
     """
     if content is None and not mask.is_file():
         return None
-    copies = sorted(capture.mask_history.glob(f"{mask.stem}_*{mask.suffix}"))
+    # not of a layer whose name goes on after the same words
+    copies = [
+        path
+        for path in sorted(capture.mask_history.glob(f"*{mask.suffix}"))
+        if _read_time(path) and STAMP.sub("", path.stem) == mask.stem
+    ]
     # Names give the order: a fast disk takes several copies within a millisecond, and clocks are set back.
     latest = max((_read_time(path) for path in copies), default=0)
     seconds, milliseconds = divmod(max(time.time_ns() // 1_000_000, latest + 1), 1000)
@@ -41,7 +48,7 @@ def keep(capture: Capture, mask: Path, content: bytes | None = None) -> Path | N
 
 def _read_time(copy: Path) -> int:
     """Return the milliseconds in the name of a copy, 0 for another name."""
-    match = re.search(r"_(\d{8}_\d{6})_(\d{3})$", copy.stem)
+    match = STAMP.search(copy.stem)
     try:
         return 1000 * calendar.timegm(time.strptime(match[1], "%Y%m%d_%H%M%S")) + int(match[2]) if match else 0
     except ValueError:

@@ -18,7 +18,7 @@ from importlib import metadata
 from pathlib import Path
 
 from .. import __version__
-from ..settings.settings import Settings
+from ..settings.settings import Settings, known_settings
 from . import stages
 from .capture import Capture
 from .code_key import data_files
@@ -60,7 +60,7 @@ def collect(
         },
         "versions": {"WildCap": __version__, "Python": platform.python_version(), "packages": _packages()},
         "capture": {"name": capture.root.name, "sources": _sources(capture.source, record, tick)},
-        "stages": {name: _stage(done) for name, done in record["stages"].items()},
+        "stages": {name: _stage(name, done) for name, done in record["stages"].items()},
         **({} if tone is None else {"skin_tone": tone}),
         **({"retouch": layers} if layers else {}),
         "weights": _weights(record, settings, tick),
@@ -131,11 +131,13 @@ def _sources(source: Path | None, record: dict, tick: Callable[[], None]) -> lis
     return sources
 
 
-def _stage(done: dict) -> dict:
-    """Return how a stage was run; places outside of the capture are named without their folder."""
+def _stage(stage: str, done: dict) -> dict:
+    """Return how a stage was run; places outside of the capture are named without their folder, private words not."""
+    private = {name for name, field in known_settings().items() if field.metadata.get("private")}
     settings = {
         name: re.split(r"[\\/]", value.rstrip("\\/"))[-1] if isinstance(value, str) else value
         for name, value in done["settings"].items()
+        if f"{stage}.{name}" not in private
     }
     return {
         "finished": done["finished"],

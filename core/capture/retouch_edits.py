@@ -31,7 +31,8 @@ def add_layer(capture: Capture, name: str, map_name: str, tone: Colour | None = 
     with _changing:
         layers = read_layers(capture)
         name = _free_name(name.strip() or map_name.capitalize(), {layer.name for layer in layers})
-        file = _free_file(capture, safe_name(name), {layer.file for layer in layers})
+        masks = {path.name for path in (capture.shadow_mask, capture.protect_mask)}  # whose history lies beside theirs
+        file = _free_file(capture, safe_name(name), masks | {layer.file for layer in layers})
         layer = Layer(file, name, map_name, tone=tone)
         write_layers(capture, (*layers, layer))
     return layer

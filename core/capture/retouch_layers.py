@@ -26,6 +26,8 @@ MAPS = {"albedo": "diffuse_albedo.png", "specular": "specular_albedo.png", "norm
 """What a layer may lie over -> that map's file."""
 FOLDER, LIST = "retouch", "layers.json"
 SUFFIX, BELOW = ".png", ".below.png"
+BELOW_SIDE = 256
+"""Texels of a side of the small picture of what was below."""
 LONGEST_NAME = 63
 """Characters of a layer's name, as of Blender's own names."""
 

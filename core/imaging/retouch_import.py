@@ -15,14 +15,11 @@ from ..capture import retouch_edits, tone_choice
 from ..capture.capture import Capture
 from ..capture.files import replacing
 from ..capture.messages import Problem, Reporter
-from ..capture.retouch_layers import MAPS, Layer, below_of, picture_of
+from ..capture.retouch_layers import BELOW_SIDE, MAPS, Layer, below_of, picture_of
 from ..settings.colour_values import to_linear
 from ..settings.settings import Settings
 from . import images
-from .layers import check_shape, lay_over, read_layer
-
-BELOW_SIDE = 256
-"""Texels of a side of the small picture of what was below."""
+from .layers import check_shape
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
@@ -65,22 +62,12 @@ def keep_as_it_is(capture: Capture, layer: Layer) -> Layer:
     return retouch_edits.change_layer(capture, layer.file, tone=layer.tone or now)
 
 
-def export_layer(capture: Capture, layer: Layer, to: Path, below: bool = False) -> None:
-    """Write a layer's picture to a new file, or with `below` its map of 4K with the layer over it, 16 bits.
-
-    Raises Problem if there is a file already, or nothing was painted.
-    """
+def export_layer(capture: Capture, layer: Layer, to: Path) -> None:
+    """Write a layer's picture to a new file. Raises Problem if there is a file already, or nothing was painted."""
     if to.exists():
         raise Problem(f"{to} exists already.", "Choose another name; nothing is overwritten.")
     path = picture_of(capture, layer)
     if not path.is_file():
         raise Problem(f"Nothing was painted on the layer {layer.name} yet.", "Paint on it, or choose another layer.")
-    if not below:
-        with replacing(to) as temporary:
-            temporary.write_bytes(path.read_bytes())
-        return
-    source = capture.maps_4k if (capture.maps_4k / MAPS[layer.map]).is_file() else capture.maps
-    stored = images.read_data(source / MAPS[layer.map])[..., : 1 if layer.map == "specular" else 3]
-    together, _ = lay_over(stored, read_layer(path), layer.opacity)
-    write = images.write_srgb if layer.map == "albedo" else images.write_data
-    write(to, together, bits=16)
+    with replacing(to) as temporary:
+        temporary.write_bytes(path.read_bytes())

@@ -26,7 +26,7 @@ def setting(default, **metadata):
     parse: syntax of a text in a few words, and its parser, which raises Problem. when: whether a path is used, by the
     stage's settings; required: then it must not be empty; holds: files in the folder. label, titles: names in Blender
     of the setting and its choices. flag: option of `core run` or `core deliver`. per_face: not changed by a quality.
-    affects_result: False if no result depends on it.
+    affects_result: False if no result depends on it. private: the user's own words, which no report or delivery tells.
     """
     return dataclasses.field(default=default, metadata=metadata)
 

@@ -196,11 +196,11 @@ class UpscaleSettings:
 class RetouchSettings:
     """What the tools Import Layer and Copy From a Frame are asked for; the stage itself has no settings."""
 
-    picture: str = setting("", form="a path", affects_result=False)
+    picture: str = setting("", form="a path", private=True, affects_result=False)
     """Picture to import as a layer, with its folder"""
     over: str = setting("albedo", choices=("albedo", "specular", "normal"), affects_result=False)
     """Map that the picture is laid over"""
-    layer: str = setting("", form="a name", affects_result=False)
+    layer: str = setting("", form="a name", private=True, affects_result=False)
     """Name of the layer; empty: that of the picture"""
     whole: bool = setting(False, affects_result=False)
     """Take a picture without alpha, which covers all that is below"""

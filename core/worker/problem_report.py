@@ -264,6 +264,6 @@ def _without_path_settings(chosen: known_settings.Settings) -> dict:
     values = known_settings.to_json(chosen)
     for name, field in known_settings.known_settings().items():
         stage, _, own = name.rpartition(".")
-        if (field.metadata.get("path") or stage == "retouch") and values[stage][own]:
-            values[stage][own] = REMOVED  # a layer's name is the artist's own words
+        if (field.metadata.get("path") or field.metadata.get("private")) and values[stage][own]:
+            values[stage][own] = REMOVED
     return values

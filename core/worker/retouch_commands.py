@@ -35,7 +35,6 @@ def add_commands(commands) -> None:
     give = add_command(retouch, "export", _export, "write a layer's picture to a new file", "CAPTURE")
     give.add_argument("layer", metavar="LAYER", help="its name")
     give.add_argument("to", metavar="PNG", type=path_of)
-    give.add_argument("--below", action="store_true", help="with the map below, as one picture")
     for name, run, words in (
         ("delete", _delete, "delete a layer; its picture goes to mask_history"),
         ("keep", _keep, "keep a marked layer as it is over the changed skin"),
@@ -79,7 +78,7 @@ def _export(options: argparse.Namespace) -> int:
     from ..imaging.retouch_import import export_layer
 
     capture = _open(options.capture)
-    export_layer(capture, _find(capture, options.layer), options.to, options.below)
+    export_layer(capture, _find(capture, options.layer), options.to)
     print(options.to)
     return 0
 

@@ -81,7 +81,9 @@ class LayerPainter(BaseOperator):
 
     @classmethod
     def poll(cls, context):
-        return cls.allowed(session.layer() is not None, "No layer is being painted: click Paint, under Retouch, first")
+        return cls.allowed(
+            session.layer() is not None, "No layer is being painted: click On the Head, under Retouch, first"
+        )
 
 
 class WILDCAP_OT_layer_brush(LayerPainter, bpy.types.Operator):

@@ -16,7 +16,7 @@ from ...core.capture import mask_history, retouch_edits, retouch_layers, tone_ch
 from ...core.capture.capture import Capture
 from ...core.capture.messages import Problem
 from ...core.capture.newest_maps import find_newest_maps
-from ...core.capture.retouch_layers import Layer
+from ...core.capture.retouch_layers import BELOW_SIDE, Layer
 from ...core.capture.stages import advise_remaking
 from ...core.capture.toned_albedo import apply_tone
 from ...core.settings.colour_values import Colour, to_linear
@@ -26,8 +26,6 @@ from . import brush, healing, layer_pixels, mask_image, png, view
 
 CANVAS, SOURCE = "WildCap Retouch", "WildCap Retouch Source"
 """Names of the painted image, and of the one that the brush copies from."""
-BELOW_SIDE = 256
-"""Texels of the small picture of what was below."""
 LEVELS_16 = 65535
 
 

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from core.capture import retouch_edits, retouch_layers, stages
+from core.capture import mask_history, retouch_edits, retouch_layers, stages
 from core.capture.capture import Capture
 from core.capture.newest_maps import find_newest_maps, find_skin_weight
 from core.settings.settings import Settings
@@ -151,3 +151,16 @@ def test_what_was_baked_before_there_were_layers_is_out_of_date_with_them(captur
     add(capture)
     finish(capture)
     assert capture.state(transfer, Settings()) == "stale"
+
+
+def test_the_history_of_one_layer_is_not_anothers(capture):
+    """Names that go on after the same words, and the masks' own, are counted apart."""
+    first = add(capture, "Spot", b"first")
+    mask_history.keep(capture, retouch_layers.picture_of(capture, first))
+    other = add(capture, "Spot_2", b"other")
+    for _ in range(mask_history.KEPT_MASKS + 2):
+        mask_history.keep(capture, retouch_layers.picture_of(capture, other))
+        mask_history.keep(capture, retouch_layers.picture_of(capture, first), b"later")
+    kept = [path.read_bytes() for path in capture.mask_history.iterdir()]
+    assert kept.count(b"other") == mask_history.KEPT_MASKS == kept.count(b"later")
+    assert retouch_edits.add_layer(capture, "shadow_mask", "albedo").file != "shadow_mask.png"

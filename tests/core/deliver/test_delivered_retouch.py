@@ -12,7 +12,7 @@ from core.capture import retouch_edits, retouch_layers, stages
 from core.capture.capture import Capture
 from core.capture.messages import Done, Failed
 from core.imaging import images
-from core.settings.settings import Settings
+from core.settings.settings import from_json
 from tests.fixtures import delivered, recorded
 from tests.fixtures.delivered import OBJ, SIDE, folder
 
@@ -34,7 +34,7 @@ def capture(tmp_path) -> Capture:
                 albedo[4:8, 4:8] = SPOT
                 write = images.write_linear if name.endswith("exr") else images.write_srgb
                 write(target / name, images.srgb_to_linear(albedo) if name.endswith("exr") else albedo, **BITS[name])
-        recorded.record(made, stages.by_name(stage), Settings())
+        recorded.record(made, stages.by_name(stage), from_json({"retouch": {"layer": "Her secret"}}))
     return made
 
 

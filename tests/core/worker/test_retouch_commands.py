@@ -49,8 +49,6 @@ def test_a_picture_comes_in_is_listed_goes_out_and_is_deleted(capture, picture, 
     assert out.read_bytes() == retouch_layers.picture_of(capture, layer).read_bytes()
     code, words = retouch(capsys, "export", capture.root, "Krita scar", out)
     assert code == 2 and "exists already" in words
-    assert retouch(capsys, "export", capture.root, "Krita scar", tmp_path / "b.png", "--below")[0] == 0
-    assert images.size(tmp_path / "b.png") == images.size(capture.maps / "diffuse_albedo.png")
     assert retouch(capsys, "keep", capture.root, "Krita scar")[0] == 0
     assert retouch(capsys, "delete", capture.root, "Krita scar")[0] == 0
     assert not retouch_layers.read_layers(capture) and len(list(capture.mask_history.iterdir())) == 1
